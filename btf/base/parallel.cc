@@ -1,0 +1,37 @@
+#include "btf/base/parallel.h"
+
+#include <algorithm>
+
+#include <tbb/parallel_for.h>
+#include <tbb/task_arena.h>
+
+namespace tessera {
+
+int NumThreads(const RunContext& context) {
+  const int cores = std::max(1, tbb::this_task_arena::max_concurrency());
+  return context.num_threads > 0 ? context.num_threads : cores;
+}
+
+void ParallelFor(const RunContext& context, int64_t begin, int64_t end, int64_t grain,
+                 const std::function<void(int64_t begin, int64_t end)>& body) {
+  if (begin >= end) {
+    return;
+  }
+  const int64_t step = std::max<int64_t>(1, grain);
+  const int64_t num_ranges = (end - begin + step - 1) / step;
+  const auto run = [&](int64_t range) {
+    if (!context.stop.stop_requested()) {
+      body(begin + range * step, std::min(end, begin + (range + 1) * step));
+    }
+  };
+  if (num_ranges == 1 || context.num_threads == 1) {
+    for (int64_t range = 0; range < num_ranges; ++range) {
+      run(range);
+    }
+    return;
+  }
+  tbb::task_arena arena(NumThreads(context));
+  arena.execute([&] { tbb::parallel_for(int64_t{0}, num_ranges, run, tbb::simple_partitioner{}); });
+}
+
+}  // namespace tessera

@@ -1,0 +1,82 @@
+// What a codec offers: encode, embedding, GLSL; decoding is in decoder.h, which the client SDK links without
+// this.
+//
+//   const Codec* codec = FindCodec("dsh-cls");
+//   TESSERA_ASSIGN_OR_RETURN(Material material, codec->Encode(source, {.kl = 25, .kv = 25}, context));
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include <absl/status/statusor.h>
+
+#include "btf/base/run_context.h"
+#include "btf/codec/material.h"
+#include "btf/data/btf_source.h"
+
+namespace tessera {
+
+// The energy bound of the constrained least squares: the integral of f^2 estimated as (solid angle / M) sum
+// f^2.
+enum class ClsEnergy { kHemisphere, kSphere };
+
+struct EncodeParams {
+  int kl = 25;  // light coefficients, one of 1, 4, 9, 16, 25, 36, 49
+  int kv = 25;  // view coefficients, likewise
+  ClsEnergy cls_energy = ClsEnergy::kHemisphere;
+  uint64_t memory_budget_bytes = uint64_t{512} << 20;
+};
+
+// Texels as points in R^dims in which squared Euclidean distance approximates the hemisphere-integrated
+// squared difference of two BTFels (mean over channels), each as seen after `turn` quarter turns. Components
+// are in order of falling variance, so a prefix is a coarser embedding.
+struct Embedding {
+  int width = 0;
+  int height = 0;
+  int dims = 0;
+  std::vector<float> values;     // [turn 0..3][height][width][dims]; (x, y) always in the unturned exemplar
+  std::vector<double> variance;  // [dims], of each component
+  double total_variance =
+      0.0;  // of all components, kept or not; captured share = sum(variance) / total_variance
+
+  [[nodiscard]] const float* at(int turn, int x, int y) const {
+    return values.data() + ((static_cast<size_t>(turn) * height + y) * width + x) * dims;
+  }
+};
+
+// GLSL of a codec: declares `vec3 DecodeBtfel(int btfel, vec3 light, vec3 view)`, unclamped, with the
+// semantics of Decoder::Evaluate, reading the two buffer textures below through texelFetch.
+struct CodecGlsl {
+  std::string source;
+  int words_per_btfel = 0;
+  std::vector<uint32_t> btfel_words;  // usamplerBuffer `btfel_words`, format RGBA32UI, padded to whole texels
+  std::vector<float> shared_values;   // samplerBuffer `codec_values`, format R32F
+};
+
+class Codec {
+ public:
+  virtual ~Codec() = default;
+  [[nodiscard]] virtual std::string_view id() const = 0;
+  [[nodiscard]] virtual int version() const = 0;
+
+  // Encodes every texel; streams rows within params.memory_budget_bytes. Errors: INVALID_ARGUMENT naming the
+  // parameter and its legal values, or the sample that is not finite; CANCELLED; whatever the source returns.
+  [[nodiscard]] virtual absl::StatusOr<Material> Encode(BtfSource& source, const EncodeParams& params,
+                                                        const RunContext& context) const = 0;
+
+  // PCA embedding over the exemplar in all four turns, centred once over all.
+  // Errors: INVALID_ARGUMENT (dims < 1), CANCELLED.
+  [[nodiscard]] virtual absl::StatusOr<Embedding> Embed(const Material& material, int dims,
+                                                        const RunContext& context) const = 0;
+
+  [[nodiscard]] virtual absl::StatusOr<CodecGlsl> Glsl(const BtfelTable& table) const = 0;
+};
+
+// nullptr when unknown. Codecs are immutable and live for the whole program.
+[[nodiscard]] const Codec* FindCodec(std::string_view id);
+// Ids in order of registration, for messages and help.
+[[nodiscard]] std::vector<std::string_view> CodecIds();
+
+}  // namespace tessera

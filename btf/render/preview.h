@@ -1,0 +1,61 @@
+// A picture of a dressed mesh: the scene, and its two renderers.
+//
+//   PreviewScene scene{.dressing = &dressing, .tile_set = &tile_set};
+//   scene.camera = FramingCamera(dressing.mesh);
+//   TESSERA_ASSIGN_OR_RETURN(Image image, RenderGl(*context, scene, run_context));
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include <absl/status/statusor.h>
+#include <Eigen/Core>
+
+#include "btf/base/run_context.h"
+#include "btf/image/image.h"
+#include "btf/math/conventions.h"
+#include "btf/wang/dressing.h"
+#include "btf/wang/tile_set.h"
+
+namespace tessera {
+
+class OffscreenContext;
+
+struct Camera {
+  Eigen::Vector3d eye{0, 0, 3};
+  Eigen::Vector3d target{0, 0, 0};
+  Eigen::Vector3d up{0, 1, 0};
+  double fov_y_rad = RadFromDeg(35.0);
+};
+
+struct Light {
+  enum class Kind { kDirectional, kPoint };
+  Kind kind = Kind::kDirectional;
+  // Directional: towards the light, any length. Point: position.
+  Eigen::Vector3d place{-0.4, 0.5, 0.8};
+  // Irradiance on a facing surface; for a point light at distance 1 (falls with the square).
+  Eigen::Vector3d irradiance{kPi, kPi, kPi};
+};
+
+struct PreviewScene {
+  const Dressing* dressing = nullptr;
+  const TileSet* tile_set = nullptr;
+  Camera camera;
+  std::vector<Light> lights{Light{}};
+  int width = 640;   // 16..8192
+  int height = 480;  // 16..8192
+};
+
+// A camera that sees all of the mesh, from the front and a little above.
+[[nodiscard]] Camera FramingCamera(const QuadMesh& mesh, int width, int height);
+
+// Linear RGBA, alpha = coverage of the pixel by the mesh; pixel radiance = sum over lights of value *
+// irradiance / pi. Errors: INVALID_ARGUMENT (sizes, non-finite camera or lights, arrangement mismatch),
+// UNIMPLEMENTED (codec without GLSL), CANCELLED, INTERNAL (GL).
+[[nodiscard]] absl::StatusOr<Image> RenderGl(OffscreenContext& context, const PreviewScene& scene,
+                                             const RunContext& run_context);
+
+// The same picture in double precision on the CPU: slow, for tests.
+[[nodiscard]] absl::StatusOr<Image> RenderReference(const PreviewScene& scene, const RunContext& run_context);
+
+}  // namespace tessera

@@ -1,0 +1,54 @@
+// A tile set: the tiles of one material in one arrangement, as index maps into a table of the referenced
+// BTFels.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <string>
+#include <vector>
+
+#include <absl/status/status.h>
+#include <absl/status/statusor.h>
+#include <nlohmann/json.hpp>
+
+#include "btf/codec/btfel_table.h"
+
+namespace tessera {
+
+// One entry of `tile_index`: the low 30 bits name the BTFel, the top 2 its quarter turns, counter-clockwise.
+constexpr uint32_t PackTexel(uint32_t btfel, int turns) {
+  return btfel | (static_cast<uint32_t>(turns & 3) << 30);
+}
+constexpr uint32_t BtfelOfTexel(uint32_t texel) {
+  return texel & 0x3fffffffu;
+}
+constexpr int TurnsOfTexel(uint32_t texel) {
+  return static_cast<int>(texel >> 30);
+}
+
+struct TileSet {
+  std::string arrangement_id;
+  std::string arrangement_sha256;
+  int tile_size = 0;                 // w, texels
+  int strip_height = 0;              // h, texels
+  std::vector<uint32_t> tile_codes;  // ascending, the arrangement's
+  std::vector<uint32_t> tile_index;  // [tiles][w][w], row 0 on top; see PackTexel
+  BtfelTable btfels;                 // only the referenced BTFels
+  Provenance provenance;
+  std::string radiometry;
+  nlohmann::json certificate = nlohmann::json::object();  // measured seam quality
+  nlohmann::json metadata =
+      nlohmann::json::object();  // seed, parameters, thresholds reached, anisotropy, captured share
+
+  [[nodiscard]] uint32_t texel(int tile, int x, int y) const {
+    return tile_index[(static_cast<size_t>(tile) * tile_size + y) * tile_size + x];
+  }
+};
+
+// Container of kind "tile_set" (codec/FORMAT.md). Errors as for materials; the arrangement's SHA-256 must
+// match a built-in arrangement of that id when the id is known here.
+[[nodiscard]] absl::StatusOr<std::string> SerializeTileSet(const TileSet& tile_set);
+[[nodiscard]] absl::StatusOr<TileSet> ParseTileSet(std::span<const std::byte> bytes);
+
+}  // namespace tessera
