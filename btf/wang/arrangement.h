@@ -1,14 +1,18 @@
 // Canonical arrangements: the list of tiles by edge code, independent of material and resolution.
 //
-//                 side 2 (north)              A side is (colour, sign). Tile code = sum over sides k of
-//               +----------------+              (colour_k + 2 [sign_k is '-']) * 4^k.
-//               |                |            Tiles are listed in ascending code. Ids are permanent.
-//   side 3      |                |   side 1   Sign '+': the strip runs along the tile's counter-clockwise
-//   (west)      |                |   (east)   boundary and the tile takes the strip's upper half; '-':
-//   against
-//               |                |            it, lower half.
-//               +----------------+
+//                 side 2 (north)         A side is (colour, sign). Tile code = sum over sides k of
+//               +----------------+         (colour_k + 2 [sign_k is '-']) * 4^k. Tiles are listed in
+//               |                |         ascending code. Ids are permanent: a changed list gets a new id.
+//   side 3      |                |         Sign '+': the strip runs along the tile's counter-clockwise
+//   (west)      |                | side 1  boundary and the tile takes the strip's upper half; '-': against
+//               |                | (east)  it, and the lower half. Two tiles fit across an edge when their
+//               +----------------+         sides have one colour and opposite signs.
 //                 side 0 (south)
+//
+//   TESSERA_ASSIGN_OR_RETURN(const Arrangement* arrangement, FindArrangement("surface-96"));
+//   TileSides sides = SidesFromTileCode(arrangement->codes[tile]);
+//
+// Sources: [Leung2007] 3.2 and 4.1 (96 tiles for closed surfaces), [Fu2005] (Euler circuits give the signs).
 #pragma once
 
 #include <array>
@@ -46,6 +50,11 @@ struct Arrangement {
   // Index of the tile with this code, -1 if there is none.
   [[nodiscard]] int IndexOfCode(uint32_t code) const;
 };
+
+// True when tile sides `a` and `b` may meet across an edge: one colour, opposite signs.
+[[nodiscard]] constexpr bool SidesMatch(const TileSide& a, const TileSide& b) {
+  return a.colour == b.colour && a.sign != b.sign;
+}
 
 // The text whose SHA-256 identifies an arrangement: the id, then one code a line, decimal, each line ended by
 // '\n'.

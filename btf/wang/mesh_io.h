@@ -1,0 +1,42 @@
+// Reads quad meshes from Wavefront OBJ and Geomview OFF.
+//
+//   TESSERA_ASSIGN_OR_RETURN(QuadMesh mesh, ReadQuadMesh("horse_quad.obj"));
+//
+// Both formats list a face's vertices counter-clockwise seen from the front. Read here: OBJ `v`, `vn` and `f`
+// (v, v/vt, v//vn, v/vt/vn, negative indices, '\' continuations); every other OBJ statement is passed over.
+// OFF and COFF, NOFF, CNOFF in ASCII; colours are passed over. Numbers are parsed strictly: what is not a
+// finite number is an error and never a silent 0, which is why tinyobjloader is not used (2.0.0rc10 reads
+// "nan" as 0, a cut-off vertex as one with zeros, and drops faces of two vertices, which shifts the numbers
+// of all later ones).
+#pragma once
+
+#include <cstddef>
+#include <filesystem>
+#include <span>
+#include <string_view>
+
+#include <absl/status/statusor.h>
+
+#include "btf/wang/quad_mesh.h"
+
+namespace tessera {
+
+// Most bytes a mesh file may have, vertices and faces a mesh may have.
+inline constexpr size_t kMaxMeshFileBytes = size_t{1} << 30;
+inline constexpr size_t kMaxMeshElements = size_t{1} << 24;
+
+// The mesh in `bytes`; the format is told by the extension of `file_name`, which also opens every message.
+// Faces that can be oriented consistently are turned to agree with the majority of their component. Normals
+// are the file's, averaged over the corners that meet at a vertex; vertices without any get ComputeNormals'.
+// Unreferenced vertices are dropped.
+// Errors: INVALID_ARGUMENT naming the line (malformed or non-finite number, wrong count, cut-off file), the
+// face number, counted from 1 as modelling tools do (triangle, n-gon, index out of range, repeated vertex),
+// or the edge (non-manifold, non-orientable), and unknown extensions; RESOURCE_EXHAUSTED naming the size and
+// the limit.
+[[nodiscard]] absl::StatusOr<QuadMesh> ParseQuadMesh(std::span<const std::byte> bytes,
+                                                     std::string_view file_name);
+
+// ParseQuadMesh of a file. Errors: also NOT_FOUND and UNAVAILABLE naming the path.
+[[nodiscard]] absl::StatusOr<QuadMesh> ReadQuadMesh(const std::filesystem::path& path);
+
+}  // namespace tessera
