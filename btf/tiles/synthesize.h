@@ -1,0 +1,49 @@
+// A tile set from a material and an arrangement: corners, edges, frames, interior [Leung2007] 3.2.
+//
+//   TESSERA_ASSIGN_OR_RETURN(const Arrangement* arrangement, FindArrangement("surface-96"));
+//   TESSERA_ASSIGN_OR_RETURN(TileSet set, SynthesizeTileSet(material, *arrangement,
+//                                                           {.tile_size = 64, .strip_height = 16}, context));
+//   uint32_t texel = set.texel(tile, x, y);   // a BTFel of set.btfels and its quarter turns
+#pragma once
+
+#include <cstdint>
+
+#include <absl/status/statusor.h>
+
+#include "btf/base/run_context.h"
+#include "btf/codec/material.h"
+#include "btf/wang/arrangement.h"
+#include "btf/wang/tile_set.h"
+
+namespace tessera {
+
+struct SynthesisParams {
+  int tile_size = 64;     // w, texels, at least 2 h
+  int strip_height = 16;  // h, texels, even, at least 8: about the size of a feature
+  uint64_t seed = 1;
+  bool force = false;  // synthesise turned strips of an anisotropic material all the same
+  // A filled strip or tile must reach both. Units: kMeanStep, the material's mean embedding distance of
+  // neighbouring texels, and its 99.9th percentile.
+  double mean_threshold = 2.0;   // mean mismatch along cuts / mean step
+  double texel_threshold = 2.0;  // largest mismatch of one cut pair / 99.9th percentile of steps
+};
+
+// The payload of a refused or failed synthesis: a stable word beside the sentence, one of
+// NOT_ISOTROPIC, MATERIAL_TOO_SMALL, THRESHOLD_NOT_REACHED.
+inline constexpr char kReasonPayload[] = "tessera.reason";
+
+// Every texel of the result is a BTFel of `material` with a turn (0 throughout for "plane-*"); the table
+// keeps the referenced BTFels in ascending exemplar order. Same material, arrangement and parameters give the
+// same bytes for any number of threads. Metadata: seed, parameters, anisotropy, captured variance, thresholds
+// and what was reached, referenced share; certificate: see certificate.h.
+//
+// Errors: INVALID_ARGUMENT naming the size and its limit (reason MATERIAL_TOO_SMALL when the exemplar is the
+// cause) or an unknown codec; FAILED_PRECONDITION with reason NOT_ISOTROPIC (turned strips only, unless
+// forced) or THRESHOLD_NOT_REACHED, each with its figures; CANCELLED within one patch search. Progress:
+// stages "corners", "strips" and "tiles".
+[[nodiscard]] absl::StatusOr<TileSet> SynthesizeTileSet(const Material& material,
+                                                        const Arrangement& arrangement,
+                                                        const SynthesisParams& params,
+                                                        const RunContext& context);
+
+}  // namespace tessera
