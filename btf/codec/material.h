@@ -19,8 +19,11 @@ struct Material {
   BtfelTable btfels;  // [height * width], row 0 on top
   Provenance provenance;
   std::string radiometry;
-  // Recorded facts for people and tools: encode seconds, error figures, generator parameters.
+  // Recorded facts for people and tools: generator parameters, error figures. No times: same input, same
+  // bytes.
   nlohmann::json metadata = nlohmann::json::object();
+  // Header keys that this version does not know; written back as they were.
+  nlohmann::json other_keys = nlohmann::json::object();
 };
 
 // Bytes of the container. Errors: INVALID_ARGUMENT when shapes disagree.
