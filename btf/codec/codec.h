@@ -46,8 +46,11 @@ struct Embedding {
   }
 };
 
-// GLSL of a codec: declares `vec3 DecodeBtfel(int btfel, vec3 light, vec3 view)`, unclamped, with the
-// semantics of Decoder::Evaluate, reading the two buffer textures below through texelFetch.
+// GLSL of a codec. Declares
+//   vec3 BlendBtfels(ivec4 btfels, vec4 weights, int count, vec3 light, vec3 view)
+// the weighted sum of the first `count` BTFels' values, unclamped, under one pair of directions in their own,
+// unturned frame, with the semantics of Decoder::Evaluate; it reads the two buffer textures below through
+// texelFetch.
 struct CodecGlsl {
   std::string source;
   int words_per_btfel = 0;
