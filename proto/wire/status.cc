@@ -10,6 +10,9 @@
 namespace tessera {
 namespace {
 
+constexpr std::string_view kReasonUrl = "tessera.reason";
+constexpr std::string_view kSubjectUrl = "tessera.subject";
+
 absl::string_view AbslView(std::string_view text) {
   return {text.data(), text.size()};
 }
@@ -49,20 +52,20 @@ absl::Status WithReason(absl::Status status, std::string_view reason, std::strin
   if (status.ok()) {
     return status;
   }
-  status.SetPayload(AbslView(kReasonPayload), absl::Cord(AbslView(reason)));
+  status.SetPayload(AbslView(kReasonUrl), absl::Cord(AbslView(reason)));
   if (!subject.empty()) {
-    status.SetPayload(AbslView(kSubjectPayload), absl::Cord(AbslView(subject)));
+    status.SetPayload(AbslView(kSubjectUrl), absl::Cord(AbslView(subject)));
   }
   return status;
 }
 
 std::string ReasonOf(const absl::Status& status) {
-  const std::string reason = Payload(status, kReasonPayload);
+  const std::string reason = Payload(status, kReasonUrl);
   return reason.empty() ? std::string(ReasonOfCode(status.code())) : reason;
 }
 
 std::string SubjectOf(const absl::Status& status) {
-  return Payload(status, kSubjectPayload);
+  return Payload(status, kSubjectUrl);
 }
 
 grpc::Status GrpcFromStatus(const absl::Status& status) {

@@ -16,9 +16,6 @@
 
 namespace tessera {
 
-inline constexpr std::string_view kReasonPayload = "tessera.reason";
-inline constexpr std::string_view kSubjectPayload = "tessera.subject";
-
 // `status` with the reason, and the subject unless it is empty. An OK status is returned as it is.
 [[nodiscard]] absl::Status WithReason(absl::Status status, std::string_view reason,
                                       std::string_view subject = {});

@@ -1,0 +1,63 @@
+#include "proto/wire/convert.h"
+
+#include <gtest/gtest.h>
+
+namespace tessera {
+namespace {
+
+constexpr double kRoundingDeg = 1e-12;  // one conversion to degrees and back
+
+TEST(ConvertTest, DirectionsAreDegreesOnTheWire) {
+  const v1::Direction message = MessageFromDirection({kPi / 4, kPi});
+  EXPECT_NEAR(message.polar_deg(), 45, kRoundingDeg);
+  EXPECT_NEAR(message.azimuth_deg(), 180, kRoundingDeg);
+  EXPECT_NEAR(DirectionFromMessage(message).theta_rad, kPi / 4, kRoundingDeg);
+}
+
+TEST(ConvertTest, ArrangementsComeBackAndAreChecked) {
+  for (const Arrangement& arrangement : BuiltinArrangements()) {
+    v1::Arrangement message = MessageFromArrangement(arrangement);
+    const auto back = ArrangementFromMessage(message);
+    ASSERT_TRUE(back.ok()) << back.status();
+    EXPECT_EQ(back->id, arrangement.id);
+    EXPECT_EQ(back->codes, arrangement.codes);
+    EXPECT_EQ(back->turned_strips, arrangement.turned_strips);
+    EXPECT_EQ(back->sha256, arrangement.sha256);
+    message.set_tile_codes(0, message.tile_codes(0) + 1);
+    EXPECT_EQ(ArrangementFromMessage(message).status().code(), absl::StatusCode::kInvalidArgument);
+  }
+}
+
+TEST(ConvertTest, EncodeOptionsHaveDefaults) {
+  const auto params = EncodeParamsFromMessage({});
+  ASSERT_TRUE(params.ok());
+  EXPECT_EQ(params->kl, 25);
+  EXPECT_EQ(params->kv, 25);
+  EXPECT_EQ(params->cls_energy, ClsEnergy::kHemisphere);
+  v1::EncodeOptions message;
+  message.set_cls_energy("cube");
+  EXPECT_EQ(EncodeParamsFromMessage(message).status().code(), absl::StatusCode::kInvalidArgument);
+  message.set_cls_energy("sphere");
+  message.set_kl(16);
+  EXPECT_EQ(EncodeParamsFromMessage(message)->kl, 16);
+  EXPECT_EQ(EncodeParamsFromMessage(message)->cls_energy, ClsEnergy::kSphere);
+}
+
+TEST(ConvertTest, LightsAndCamerasComeBack) {
+  Light light{.kind = Light::Kind::kPoint, .place = {1, 2, 3}, .irradiance = {4, 5, 6}};
+  const Light back = LightFromMessage(MessageFromLight(light));
+  EXPECT_EQ(back.kind, light.kind);
+  EXPECT_EQ(back.place, light.place);
+  EXPECT_EQ(back.irradiance, light.irradiance);
+  EXPECT_EQ(LightFromMessage({}).irradiance, Eigen::Vector3d::Constant(kPi));
+
+  Camera camera{.eye = {1, 2, 3}, .target = {0, 1, 0}};
+  const Camera camera_back = CameraFromMessage(MessageFromCamera(camera));
+  EXPECT_EQ(camera_back.eye, camera.eye);
+  EXPECT_EQ(camera_back.target, camera.target);
+  EXPECT_NEAR(camera_back.fov_y_rad, camera.fov_y_rad, kRoundingDeg);
+  EXPECT_NEAR(CameraFromMessage({}).fov_y_rad, RadFromDeg(35), kRoundingDeg);
+}
+
+}  // namespace
+}  // namespace tessera
