@@ -55,7 +55,7 @@ struct CodecGlsl {
   std::string source;
   int words_per_btfel = 0;
   std::vector<uint32_t> btfel_words;  // usamplerBuffer `btfel_words`, format RGBA32UI, padded to whole texels
-  std::vector<float> shared_values;   // samplerBuffer `codec_values`, format R32F
+  std::vector<float> shared_values;   // samplerBuffer `codec_values`, format RGBA32F, padded likewise
 };
 
 class Codec {

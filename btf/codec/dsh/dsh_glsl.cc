@@ -1,0 +1,279 @@
+#include "btf/codec/dsh/dsh_glsl.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstring>
+#include <string>
+#include <vector>
+
+#include <absl/strings/str_cat.h>
+#include <absl/strings/str_format.h>
+
+#include "btf/base/status_macros.h"
+
+namespace tessera {
+namespace {
+
+constexpr int kMaxBasis = 49;       // l <= 6
+constexpr int kCodesPerTexel = 16;  // RGBA32UI
+constexpr std::array<char, 4> kComponent = {'x', 'y', 'z', 'w'};
+
+// kl or kv from the shape of a basis table.
+absl::StatusOr<int> BasisSize(const BtfelTable& table, const std::string& name) {
+  const auto found = table.tables.find(name);
+  if (found == table.tables.end()) {
+    return absl::InvalidArgumentError(absl::StrCat("codec table ", name, " is missing"));
+  }
+  const CodecTable& basis = found->second;
+  const int64_t size = basis.shape.size() == 2 ? basis.shape[0] : 0;
+  const int order = static_cast<int>(std::lround(std::sqrt(static_cast<double>(size))));
+  if (size < 1 || size > kMaxBasis || int64_t{order} * order != size || basis.shape[1] != size ||
+      static_cast<int64_t>(basis.values.size()) != size * size) {
+    return absl::InvalidArgumentError(
+        absl::StrCat("codec table ", name, ": expected a square of 1, 4, 9, 16, 25, 36 or 49 rows, got ",
+                     size, " rows and ", basis.values.size(), " values"));
+  }
+  return static_cast<int>(size);
+}
+
+bool IsIdentity(const CodecTable& basis, int size) {
+  for (int i = 0; i < size * size; ++i) {
+    if (basis.values[i] != (i % (size + 1) == 0 ? 1.0f : 0.0f)) {
+      return false;
+    }
+  }
+  return true;
+}
+
+absl::StatusOr<double> LargestPolarAngle(const std::vector<Direction>& directions, const char* what) {
+  double largest = 0.0;
+  for (const Direction& direction : directions) {
+    largest = std::max(largest, direction.theta_rad);
+  }
+  if (directions.empty() || !std::isfinite(largest)) {
+    return absl::InvalidArgumentError(absl::StrCat("the table's ", what, " are missing or not finite"));
+  }
+  return largest;
+}
+
+std::string Literal(double value) {
+  return absl::StrFormat("%.9e", value);
+}
+
+// `void name(vec3 d, out float y[size])`: plain real spherical harmonics without the Condon-Shortley sign,
+// index l(l+1)+m, as a straight line of code. The azimuthal factors c_m + i s_m = (x + iy)^m carry sin^m; the
+// rest is the recursion of normalised associated Legendre functions over l.
+void AppendHarmonics(const std::string& name, int size, std::string* out) {
+  const int orders = static_cast<int>(std::lround(std::sqrt(size)));
+  absl::StrAppend(out, "void ", name, "(vec3 d, out float y[", size,
+                  "]) {\n  float c = 1.0, s = 0.0, t, p0, p1;\n");
+  double diagonal = std::sqrt(0.25 / kPi);
+  for (int m = 0; m < orders; ++m) {
+    if (m > 0) {
+      diagonal *= std::sqrt((2.0 * m + 1.0) / (2.0 * m));
+      absl::StrAppend(out, "  t = d.x * c - d.y * s; s = d.x * s + d.y * c; c = t;\n");
+    }
+    for (int l = m; l < orders; ++l) {
+      if (l == m) {
+        absl::StrAppend(out, "  p1 = ", Literal(diagonal * (m > 0 ? std::sqrt(2.0) : 1.0)), ";\n");
+      } else if (l == m + 1) {
+        absl::StrAppend(out, "  p0 = p1; p1 = ", Literal(std::sqrt(2.0 * m + 3.0)), " * d.z * p0;\n");
+      } else {
+        const double ll = static_cast<double>(l) * l;
+        const double below = (l - 1.0) * (l - 1.0);
+        const double mm = static_cast<double>(m) * m;
+        const double a = std::sqrt((4.0 * ll - 1.0) / (ll - mm));
+        const double b = std::sqrt((below - mm) / (4.0 * below - 1.0));
+        absl::StrAppend(out, "  t = ", Literal(a), " * d.z * p1 - ", Literal(a * b),
+                        " * p0; p0 = p1; p1 = t;\n");
+      }
+      absl::StrAppend(out, "  y[", l * (l + 1) + m, "] = p1 * c;\n");
+      if (m > 0) {
+        absl::StrAppend(out, "  y[", l * (l + 1) - m, "] = p1 * s;\n");
+      }
+    }
+  }
+  absl::StrAppend(out, "}\n");
+}
+
+// y <- basis y, the rows at texel `first` of codec_values, `stride` texels each.
+void AppendChangeOfBasis(const std::string& y, int size, int first, std::string* out) {
+  const int stride = (size + 3) / 4;
+  absl::StrAppend(out, "  {\n    float plain[", size, "] = ", y, ";\n    for (int i = 0; i < ", size,
+                  "; ++i) {\n      float sum = 0.0;\n");
+  for (int j = 0; j < size; ++j) {
+    if (j % 4 == 0) {
+      absl::StrAppend(out, "      q = texelFetch(codec_values, ", first, " + i * ", stride, " + ", j / 4,
+                      ");\n");
+    }
+    absl::StrAppend(out, "      sum += q.", std::string(1, kComponent[j % 4]), " * plain[", j, "];\n");
+  }
+  absl::StrAppend(out, "      ", y, "[i] = sum;\n    }\n  }\n");
+}
+
+// Where things lie in `codec_values`, in texels of four floats: the cosines and sines of the largest polar
+// angles; then for each view function j the steps and the offsets of its 3 kl codes; then the bases that are
+// not the identity.
+struct Layout {
+  int kl = 0;
+  int kv = 0;
+  bool plain_light = true;
+  bool plain_view = true;
+
+  [[nodiscard]] int row_codes() const { return 3 * kl; }
+  [[nodiscard]] int row_texels() const { return (row_codes() + 3) / 4; }
+  [[nodiscard]] int light_basis_begin() const { return 1 + kv * 2 * row_texels(); }
+  [[nodiscard]] int view_basis_begin() const {
+    return light_basis_begin() + (plain_light ? 0 : kl * ((kl + 3) / 4));
+  }
+  [[nodiscard]] int num_texels() const { return view_basis_begin() + (plain_view ? 0 : kv * ((kv + 3) / 4)); }
+  // Words of one BTFel: each view function's codes start at a texel of four words.
+  [[nodiscard]] int btfel_row_texels() const { return (row_codes() + kCodesPerTexel - 1) / kCodesPerTexel; }
+};
+
+std::string Source(const Layout& layout) {
+  std::string out;
+  absl::StrAppend(&out, "uniform usamplerBuffer btfel_words;\nuniform samplerBuffer codec_values;\n");
+  AppendHarmonics("LightHarmonics", layout.kl, &out);
+  AppendHarmonics("ViewHarmonics", layout.kv, &out);
+  absl::StrAppend(&out, R"(
+vec3 ClampPolar(vec3 d, float cosine, float sine) {
+  return d.z < cosine ? vec3(d.xy * (sine / length(d.xy)), cosine) : d;
+}
+
+vec3 BlendBtfels(ivec4 btfels, vec4 weights, int count, vec3 light, vec3 view) {
+  if (light.z <= 0.0 || view.z <= 0.0) {
+    return vec3(0.0);
+  }
+  vec4 q = texelFetch(codec_values, 0);
+  float scale = light.z < q.x ? light.z / q.x : 1.0;
+  light = ClampPolar(light, q.x, q.y);
+  view = ClampPolar(view, q.z, q.w);
+)");
+  absl::StrAppend(&out, "  float yl[", layout.kl, "];\n  float yv[", layout.kv,
+                  "];\n  LightHarmonics(light, yl);\n  ViewHarmonics(view, yv);\n");
+  if (!layout.plain_light) {
+    AppendChangeOfBasis("yl", layout.kl, layout.light_basis_begin(), &out);
+  }
+  if (!layout.plain_view) {
+    AppendChangeOfBasis("yv", layout.kv, layout.view_basis_begin(), &out);
+  }
+  // The separable sum, view functions outermost: the light weights times the steps are made once a row and
+  // serve every BTFel; the offsets need no BTFel at all. The inner lists are written out, so that llvmpipe
+  // keeps them in registers; indexed by a loop they cost several times as much.
+  absl::StrAppend(&out, R"(
+  float total = 0.0;
+  for (int n = 0; n < count; ++n) {
+    total += weights[n];
+  }
+  vec3 sum = vec3(0.0);
+)");
+  absl::StrAppend(&out, "  for (int j = 0; j < ", layout.kv, "; ++j) {\n    int table = 1 + j * ",
+                  2 * layout.row_texels(), ";\n    float w[", layout.row_codes(),
+                  "];\n    vec3 offsets = vec3(0.0);\n");
+  for (int texel = 0; texel < layout.row_texels(); ++texel) {
+    for (const bool steps : {true, false}) {
+      absl::StrAppend(&out, "    q = texelFetch(codec_values, table + ",
+                      steps ? texel : layout.row_texels() + texel, ");\n");
+      for (int n = 4 * texel; n < std::min(4 * texel + 4, layout.row_codes()); ++n) {
+        const std::string term =
+            absl::StrCat("q.", std::string(1, kComponent[n % 4]), " * yl[", n % layout.kl, "];\n");
+        if (steps) {
+          absl::StrAppend(&out, "    w[", n, "] = ", term);
+        } else {
+          absl::StrAppend(&out, "    offsets.", std::string(1, kComponent[n / layout.kl]), " += ", term);
+        }
+      }
+    }
+  }
+  absl::StrAppend(&out,
+                  "    vec3 row = total * offsets;\n    for (int n = 0; n < count; ++n) {\n"
+                  "      vec3 a = vec3(0.0);\n      uvec4 u;\n      int first = (btfels[n] * ",
+                  layout.kv, " + j) * ", layout.btfel_row_texels(), ";\n");
+  for (int n = 0; n < layout.row_codes(); ++n) {
+    if (n % kCodesPerTexel == 0) {
+      absl::StrAppend(&out, "      u = texelFetch(btfel_words, first + ", n / kCodesPerTexel, ");\n");
+    }
+    absl::StrAppend(&out, "      a.", std::string(1, kComponent[n / layout.kl]), " += float((u.",
+                    std::string(1, kComponent[(n % kCodesPerTexel) / 4]), " >> ", 8 * (n % 4),
+                    ") & 255u) * w[", n, "];\n");
+  }
+  absl::StrAppend(&out, "      row += weights[n] * a;\n    }\n    sum += yv[j] * row;\n  }\n",
+                  "  return scale * sum;\n}\n");
+  return out;
+}
+
+void CopyBasis(const CodecTable& basis, int size, int first_texel, std::vector<float>* values) {
+  const int stride = (size + 3) / 4 * 4;
+  for (int i = 0; i < size; ++i) {
+    std::copy_n(
+        basis.values.begin() + static_cast<ptrdiff_t>(i) * size, size,
+        values->begin() + 4 * static_cast<ptrdiff_t>(first_texel) + static_cast<ptrdiff_t>(i) * stride);
+  }
+}
+
+}  // namespace
+
+absl::StatusOr<CodecGlsl> DshGlsl(const BtfelTable& table) {
+  Layout layout;
+  TESSERA_ASSIGN_OR_RETURN(layout.kl, BasisSize(table, "basis_light"));
+  TESSERA_ASSIGN_OR_RETURN(layout.kv, BasisSize(table, "basis_view"));
+  TESSERA_ASSIGN_OR_RETURN(const double light_theta, LargestPolarAngle(table.lights, "lights"));
+  TESSERA_ASSIGN_OR_RETURN(const double view_theta, LargestPolarAngle(table.views, "views"));
+  const size_t k = static_cast<size_t>(3) * layout.kl * layout.kv;
+  if (table.num_coefficients != static_cast<int>(k) || table.offset.size() != k || table.step.size() != k ||
+      table.codes.size() % k != 0) {
+    return absl::InvalidArgumentError(
+        absl::StrCat("a table of kl = ", layout.kl, ", kv = ", layout.kv, " has ", k, " coefficients, got ",
+                     table.num_coefficients, " with ", table.offset.size(), " offsets, ", table.step.size(),
+                     " steps and ", table.codes.size(), " codes"));
+  }
+  const CodecTable& basis_light = table.tables.at("basis_light");
+  const CodecTable& basis_view = table.tables.at("basis_view");
+  layout.plain_light = IsIdentity(basis_light, layout.kl);
+  layout.plain_view = IsIdentity(basis_view, layout.kv);
+
+  CodecGlsl glsl;
+  glsl.source = Source(layout);
+  glsl.shared_values.resize(static_cast<size_t>(layout.num_texels()) * 4);
+  glsl.shared_values[0] = static_cast<float>(std::cos(light_theta));
+  glsl.shared_values[1] = static_cast<float>(std::sin(light_theta));
+  glsl.shared_values[2] = static_cast<float>(std::cos(view_theta));
+  glsl.shared_values[3] = static_cast<float>(std::sin(view_theta));
+
+  // Code n of row j is coefficient (channel kv + j) kl + i with n = channel kl + i.
+  const int row_codes = layout.row_codes();
+  const auto coefficient = [&](int j, int n) {
+    return (static_cast<size_t>(n / layout.kl) * layout.kv + j) * layout.kl + n % layout.kl;
+  };
+  for (int j = 0; j < layout.kv; ++j) {
+    float* row = glsl.shared_values.data() + 4 * (1 + static_cast<ptrdiff_t>(j) * 2 * layout.row_texels());
+    for (int n = 0; n < row_codes; ++n) {
+      row[n] = table.step[coefficient(j, n)];
+      row[4 * layout.row_texels() + n] = table.offset[coefficient(j, n)];
+    }
+  }
+  if (!layout.plain_light) {
+    CopyBasis(basis_light, layout.kl, layout.light_basis_begin(), &glsl.shared_values);
+  }
+  if (!layout.plain_view) {
+    CopyBasis(basis_view, layout.kv, layout.view_basis_begin(), &glsl.shared_values);
+  }
+
+  glsl.words_per_btfel = layout.kv * layout.btfel_row_texels() * 4;
+  glsl.btfel_words.assign(table.size() * glsl.words_per_btfel, 0);
+  for (size_t btfel = 0; btfel < table.size(); ++btfel) {
+    const uint8_t* codes = table.codes.data() + btfel * k;
+    uint32_t* words = glsl.btfel_words.data() + btfel * glsl.words_per_btfel;
+    for (int j = 0; j < layout.kv; ++j) {
+      for (int n = 0; n < row_codes; ++n) {
+        words[n / 4] |= static_cast<uint32_t>(codes[coefficient(j, n)]) << (8 * (n % 4));
+      }
+      words += layout.btfel_row_texels() * 4;
+    }
+  }
+  return glsl;
+}
+
+}  // namespace tessera
