@@ -7,10 +7,10 @@
 //   Redress(dressing, tile_set));
 //
 // Errors. A call returns what the server said, as an absl::Status with the server's ErrorDetail as payload
-// (wire/status.h reads its stable reason). The client adds: UNAVAILABLE once retries are used up, CANCELLED
-// after a stop request, DATA_LOSS when bytes do not have the digest they were asked by, and the status of the
-// local file system. Mutations get a random request_id unless the caller sets one, so that a repeated call
-// does nothing twice.
+// (proto/wire/status.h reads its stable reason). The client adds: UNAVAILABLE once retries are used up,
+// CANCELLED after a stop request, DATA_LOSS when bytes do not have the digest they were asked by, and the
+// status of the local file system. Mutations get a random request_id unless the caller sets one, so that a
+// repeated call does nothing twice.
 #pragma once
 
 #include <cstddef>
@@ -159,5 +159,8 @@ class Client {
 
 // The error of a job that ended FAILED or CANCELLED, its ErrorDetail as payload; OK for any other state.
 [[nodiscard]] absl::Status JobFailure(const v1::Job& job);
+// The job that a status of JobFailure is about, "jobs/J"; empty for other statuses. Tells a job that failed
+// from a call that did.
+[[nodiscard]] std::string FailedJob(const absl::Status& status);
 
 }  // namespace tessera

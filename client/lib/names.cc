@@ -43,19 +43,19 @@ absl::StatusOr<std::string> WithPrefix(std::string_view what, std::string_view p
 
 }  // namespace
 
-absl::StatusOr<std::string> MaterialName(std::string_view name) {
+absl::StatusOr<std::string> FullMaterialName(std::string_view name) {
   return WithPrefix("material", "materials/", name);
 }
 
-absl::StatusOr<std::string> ArrangementName(std::string_view name) {
+absl::StatusOr<std::string> FullArrangementName(std::string_view name) {
   return WithPrefix("arrangement", "arrangements/", name);
 }
 
-absl::StatusOr<std::string> JobName(std::string_view name) {
+absl::StatusOr<std::string> FullJobName(std::string_view name) {
   return WithPrefix("job", "jobs/", name);
 }
 
-absl::StatusOr<std::string> TileSetName(std::string_view name) {
+absl::StatusOr<std::string> FullTileSetName(std::string_view name) {
   const std::vector<std::string> parts = absl::StrSplit(AbslView(name), '/');
   if (parts.size() == 2 && IsName(parts[0]) && IsName(parts[1])) {
     return absl::StrCat("arrangements/", parts[0], "/tileSets/", parts[1]);

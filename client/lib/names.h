@@ -13,10 +13,10 @@
 namespace tessera {
 
 // Full names are accepted as they are. Errors: INVALID_ARGUMENT quoting the name and the legal form.
-[[nodiscard]] absl::StatusOr<std::string> MaterialName(std::string_view name);
-[[nodiscard]] absl::StatusOr<std::string> ArrangementName(std::string_view name);
-[[nodiscard]] absl::StatusOr<std::string> TileSetName(std::string_view name);
-[[nodiscard]] absl::StatusOr<std::string> JobName(std::string_view name);
+[[nodiscard]] absl::StatusOr<std::string> FullMaterialName(std::string_view name);
+[[nodiscard]] absl::StatusOr<std::string> FullArrangementName(std::string_view name);
+[[nodiscard]] absl::StatusOr<std::string> FullTileSetName(std::string_view name);
+[[nodiscard]] absl::StatusOr<std::string> FullJobName(std::string_view name);
 
 // The short form of a full name; what is not a full name comes back unchanged.
 [[nodiscard]] std::string ShortName(std::string_view full_name);

@@ -1,0 +1,77 @@
+// The connection behind a Client, and how one call is made on it. Private to this folder.
+#pragma once
+
+#include <memory>
+#include <stop_token>
+
+#include <grpcpp/grpcpp.h>
+
+#include "client/lib/backoff.h"
+#include "client/lib/client.h"
+#include "proto/wire/status.h"
+#include "tessera/v1/tessera.grpc.pb.h"
+
+namespace tessera {
+
+struct Client::Stubs {
+  explicit Stubs(const std::shared_ptr<grpc::Channel>& channel)
+      : materials(v1::Materials::NewStub(channel)),
+        arrangements(v1::Arrangements::NewStub(channel)),
+        tile_sets(v1::TileSets::NewStub(channel)),
+        jobs(v1::Jobs::NewStub(channel)),
+        dressings(v1::Dressings::NewStub(channel)),
+        previews(v1::Previews::NewStub(channel)),
+        blobs(v1::Blobs::NewStub(channel)),
+        server_info(v1::ServerInfo::NewStub(channel)) {}
+
+  std::unique_ptr<v1::Materials::Stub> materials;
+  std::unique_ptr<v1::Arrangements::Stub> arrangements;
+  std::unique_ptr<v1::TileSets::Stub> tile_sets;
+  std::unique_ptr<v1::Jobs::Stub> jobs;
+  std::unique_ptr<v1::Dressings::Stub> dressings;
+  std::unique_ptr<v1::Previews::Stub> previews;
+  std::unique_ptr<v1::Blobs::Stub> blobs;
+  std::unique_ptr<v1::ServerInfo::Stub> server_info;
+};
+
+// One call's gRPC context; a stop request cancels the call wherever it waits.
+class StoppableCall {
+ public:
+  explicit StoppableCall(const RunContext& context) : cancel_(context.stop, Cancel{&rpc_}) {}
+  grpc::ClientContext* rpc() { return &rpc_; }
+
+ private:
+  struct Cancel {
+    grpc::ClientContext* rpc;
+    void operator()() const { rpc->TryCancel(); }
+  };
+  grpc::ClientContext rpc_;
+  std::stop_callback<Cancel> cancel_;  // after rpc_: gone first
+};
+
+// A unary call, repeated while the server is UNAVAILABLE.
+template <class Stub, class Request, class Response>
+absl::StatusOr<Response> CallUnary(
+    Stub& stub, grpc::Status (Stub::*method)(grpc::ClientContext*, const Request&, Response*),
+    const Request& request, const RetryPolicy& retry, const RunContext& context) {
+  Backoff backoff(retry, context);
+  while (true) {
+    if (absl::Status stop = context.CheckStop(); !stop.ok()) {
+      return stop;
+    }
+    Response response;
+    StoppableCall call(context);
+    const absl::Status status = StatusFromGrpc((stub.*method)(call.rpc(), request, &response));
+    if (status.ok()) {
+      return response;
+    }
+    if (!absl::IsUnavailable(status)) {
+      return status;
+    }
+    if (absl::Status waited = backoff.Wait(status); !waited.ok()) {
+      return waited;
+    }
+  }
+}
+
+}  // namespace tessera
