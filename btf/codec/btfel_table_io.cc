@@ -11,6 +11,7 @@
 #include <absl/strings/str_join.h>
 
 #include "btf/base/status_macros.h"
+#include "btf/codec/decoder.h"
 
 namespace tessera {
 namespace {
@@ -202,6 +203,8 @@ absl::StatusOr<BtfelTable> ReadSharedTables(const Container& container) {
       table.tables[section->name] = std::move(codec_table);
     }
   }
+  // Refuses an unknown codec by name, and tables that do not fit it.
+  TESSERA_RETURN_IF_ERROR(MakeDecoder(table).status());
   return table;
 }
 

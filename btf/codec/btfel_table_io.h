@@ -24,8 +24,8 @@ namespace tessera {
 // Errors: INVALID_ARGUMENT naming what is misshapen, not finite, or a table whose name is taken.
 [[nodiscard]] absl::Status AddSharedTables(const BtfelTable& table, Container& container);
 
-// The reverse. The result has no codes yet. Errors: INVALID_ARGUMENT naming the section or key; UNIMPLEMENTED
-// naming a codec or version that this library does not know.
+// The reverse. The result has no codes yet. Errors: INVALID_ARGUMENT naming the section or key, or what of
+// the tables does not fit the codec; UNIMPLEMENTED naming a codec or version that this library does not know.
 [[nodiscard]] absl::StatusOr<BtfelTable> ReadSharedTables(const Container& container);
 
 // Section `coefficients` u8 [extents..][k]. Errors: INVALID_ARGUMENT when the codes do not fill the extents.
