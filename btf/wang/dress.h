@@ -30,7 +30,7 @@ struct DressParams {
 // An edge of the subdivided mesh whose two tiles do not match.
 struct Break {
   uint32_t face = 0;  // the lower of the two faces
-  uint8_t side = 0;
+  uint8_t side = 0;   // of the face, not of the tile
   uint32_t other_face = 0;
   uint8_t other_side = 0;
 };
@@ -46,5 +46,10 @@ struct DressResult {
 // Source: [Fu2005] 3, [Leung2007] 4.1.
 [[nodiscard]] absl::StatusOr<DressResult> DressMesh(const QuadMesh& mesh, const Arrangement& arrangement,
                                                     const DressParams& params, const RunContext& context);
+
+// The edges across which tiles do not match: colours or signs differ, or, without turned strips, the tiles
+// are turned against each other. Errors: INVALID_ARGUMENT naming the quad whose tile or turn does not exist.
+[[nodiscard]] absl::StatusOr<std::vector<Break>> FindBreaks(const Dressing& dressing,
+                                                            const Arrangement& arrangement);
 
 }  // namespace tessera

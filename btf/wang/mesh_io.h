@@ -21,22 +21,30 @@
 
 namespace tessera {
 
-// Most bytes a mesh file may have, vertices and faces a mesh may have.
+// Most bytes a mesh file may have; kMaxMeshQuads and kMaxMeshVertices bound what is in it.
 inline constexpr size_t kMaxMeshFileBytes = size_t{1} << 30;
-inline constexpr size_t kMaxMeshElements = size_t{1} << 24;
+
+// What reading changed, for people.
+struct MeshReadNotes {
+  size_t faces_turned = 0;      // wound against the majority of their component
+  size_t vertices_split = 0;    // where faces met in a point only
+  size_t vertices_dropped = 0;  // referenced by no face
+};
 
 // The mesh in `bytes`; the format is told by the extension of `file_name`, which also opens every message.
-// Faces that can be oriented consistently are turned to agree with the majority of their component. Normals
-// are the file's, averaged over the corners that meet at a vertex; vertices without any get ComputeNormals'.
-// Unreferenced vertices are dropped.
-// Errors: INVALID_ARGUMENT naming the line (malformed or non-finite number, wrong count, cut-off file), the
-// face number, counted from 1 as modelling tools do (triangle, n-gon, index out of range, repeated vertex),
-// or the edge (non-manifold, non-orientable), and unknown extensions; RESOURCE_EXHAUSTED naming the size and
-// the limit.
+// Faces wound against the majority of their connected component are turned (OrientFaces), a vertex in which
+// faces meet without sharing an edge is doubled (SplitSingularVertices), and unreferenced vertices are
+// dropped. Normals are the file's, averaged over the corners that meet in a vertex; corners whose normal
+// points behind their face are passed over, and vertices left without any get ComputeNormals'. Errors:
+// INVALID_ARGUMENT naming the line (malformed or non-finite number, wrong count, cut-off file), the face
+// (triangle, n-gon, missing vertex, repeated vertex) or the edge (not a manifold, not orientable), or an
+// unknown extension; RESOURCE_EXHAUSTED naming the size and the limit.
 [[nodiscard]] absl::StatusOr<QuadMesh> ParseQuadMesh(std::span<const std::byte> bytes,
-                                                     std::string_view file_name);
+                                                     std::string_view file_name,
+                                                     MeshReadNotes* notes = nullptr);
 
 // ParseQuadMesh of a file. Errors: also NOT_FOUND and UNAVAILABLE naming the path.
-[[nodiscard]] absl::StatusOr<QuadMesh> ReadQuadMesh(const std::filesystem::path& path);
+[[nodiscard]] absl::StatusOr<QuadMesh> ReadQuadMesh(const std::filesystem::path& path,
+                                                    MeshReadNotes* notes = nullptr);
 
 }  // namespace tessera

@@ -1,9 +1,9 @@
-// Built-in quad meshes, about unit radius, y up, ready to be dressed with tiles of 64 texels.
+// Built-in quad meshes, about unit radius, y up, z towards the viewer, with quads of about 0.13 on a side.
 //
-//   plane       1 x 1 x 0, 16 x 16 quads, facing +z
-//   torus       radii 0.7 and 0.3 about the y axis, 32 x 14 quads (not subdivided further)
-//   cube-sphere a cube's 6 x 8 x 8 quads on the unit sphere
-//   genus3      a rounded block with three round holes
+//   plane        [-1, 1] x [-1, 1] x 0, 16 x 16 quads, facing +z
+//   torus        radii 0.7 and 0.3 about the y axis, 32 x 14 quads
+//   cube-sphere  6 x 10 x 10 quads on the unit sphere, at equal angles
+//   genus3       a smooth solid with three holes, three-fold symmetric about the z axis, 576 quads
 //
 // `plane` and `torus` carry one consistent frame, so `plane-16` dresses them without breaks.
 #pragma once
@@ -17,7 +17,8 @@
 
 namespace tessera {
 
-// Closed (but for plane), oriented, with unit normals. Errors: NOT_FOUND naming the shape and the known ones.
+// Closed (but for plane) and oriented, with unit normals. Errors: NOT_FOUND naming the shape and the known
+// ones.
 [[nodiscard]] absl::StatusOr<QuadMesh> BuiltinShape(std::string_view name);
 
 // In alphabetical order.

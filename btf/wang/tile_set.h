@@ -38,16 +38,20 @@ struct TileSet {
   Provenance provenance;
   std::string radiometry;
   nlohmann::json certificate = nlohmann::json::object();  // measured seam quality
-  nlohmann::json metadata =
-      nlohmann::json::object();  // seed, parameters, thresholds reached, anisotropy, captured share
+  // Seed, parameters, thresholds reached, anisotropy, captured share.
+  nlohmann::json metadata = nlohmann::json::object();
+  // Header keys that this version does not know; written back as they were.
+  nlohmann::json other_keys = nlohmann::json::object();
 
   [[nodiscard]] uint32_t texel(int tile, int x, int y) const {
     return tile_index[(static_cast<size_t>(tile) * tile_size + y) * tile_size + x];
   }
 };
 
-// Container of kind "tile_set" (codec/FORMAT.md). Errors as for materials; the arrangement's SHA-256 must
-// match a built-in arrangement of that id when the id is known here.
+// Container of kind "tile_set" (codec/FORMAT.md). The digest must be that of the id and the codes listed, and
+// of the built-in arrangement of this id where there is one. Errors: INVALID_ARGUMENT naming the section,
+// value and limit, FAILED_PRECONDITION naming both digests; ParseTileSet, safe on hostile bytes, also those
+// of ParseContainer and UNIMPLEMENTED naming an unknown codec.
 [[nodiscard]] absl::StatusOr<std::string> SerializeTileSet(const TileSet& tile_set);
 [[nodiscard]] absl::StatusOr<TileSet> ParseTileSet(std::span<const std::byte> bytes);
 
