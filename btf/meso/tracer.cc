@@ -50,13 +50,13 @@ struct LightTables {
 class HeightFieldTracer final : public BtfSource {
  public:
   HeightFieldTracer(SurfaceMaps maps, BtfInfo info, const TraceOptions& options,
-                    std::unique_ptr<HeightFieldScene> scene, std::unique_ptr<SpecularAlbedo> specular,
+                    std::unique_ptr<HeightFieldScene> scene, const SpecularAlbedo& specular,
                     std::vector<Facet> facets, SurfaceLight light)
       : maps_(std::move(maps)),
         info_(std::move(info)),
         options_(options),
         scene_(std::move(scene)),
-        specular_(std::move(specular)),
+        specular_(specular),
         facets_(std::move(facets)),
         light_(std::move(light)) {
     const size_t stride = light_.stride();
@@ -120,7 +120,7 @@ class HeightFieldTracer final : public BtfSource {
   const BtfInfo info_;
   const TraceOptions options_;
   const std::unique_ptr<HeightFieldScene> scene_;
-  const std::unique_ptr<SpecularAlbedo> specular_;
+  const SpecularAlbedo& specular_;
   const std::vector<Facet> facets_;
   const SurfaceLight light_;
   LightTables lights_;
@@ -186,7 +186,7 @@ void HeightFieldTracer::AddHit(int64_t facet_index, int part, const ViewTables& 
   const float ny = facet.normal.y();
   const float nz = facet.normal.z();
   const float nv = std::max(kMinViewCosine, facet.normal.dot(tables.direction.cast<float>().eval()));
-  const float left_over = 1.0F - specular_->Directional(nv, facet.roughness, maps_.specular_f0);
+  const float left_over = 1.0F - specular_.Directional(nv, facet.roughness, maps_.specular_f0);
   const float diffuse_r = facet.diffuse[0] * left_over;
   const float diffuse_g = facet.diffuse[1] * left_over;
   const float diffuse_b = facet.diffuse[2] * left_over;
@@ -244,8 +244,8 @@ absl::StatusOr<std::unique_ptr<BtfSource>> TraceHeightField(SurfaceMaps maps, Bt
   if (!scene.ok()) {
     return scene.status();
   }
-  auto specular = std::make_unique<SpecularAlbedo>();
-  std::vector<Facet> facets = MakeFacets(maps, *specular);
+  static const SpecularAlbedo specular;  // the same for every surface
+  std::vector<Facet> facets = MakeFacets(maps, specular);
   std::vector<Eigen::Vector3d> lights;
   for (const Direction& light : info.lights) {
     lights.push_back(VectorFromDirection(light));
@@ -254,12 +254,12 @@ absl::StatusOr<std::unique_ptr<BtfSource>> TraceHeightField(SurfaceMaps maps, Bt
       .bounces = options.bounces,
       .edge_parts = EdgePartsFor(options.area_samples, maps.cells_per_texel),
       .seed = Mix64(options.seed, 1)};
-  auto light = SurfaceLight::Solve(maps, facets, **scene, *specular, lights, light_options, context);
+  auto light = SurfaceLight::Solve(maps, facets, **scene, specular, lights, light_options, context);
   if (!light.ok()) {
     return light.status();
   }
   return std::make_unique<HeightFieldTracer>(std::move(maps), std::move(info), options, *std::move(scene),
-                                             std::move(specular), std::move(facets), *std::move(light));
+                                             specular, std::move(facets), *std::move(light));
 }
 
 }  // namespace tessera
