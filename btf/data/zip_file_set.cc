@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <array>
 #include <mutex>
 #include <utility>
 
@@ -170,6 +171,16 @@ class ZipStream : public ByteStream {
       done += static_cast<size_t>(count);
     }
     return done;
+  }
+  // libzip checks the sum when it has seen every byte, which seeking may have prevented.
+  [[nodiscard]] absl::Status Finish() override {
+    std::array<std::byte, 4096> rest;
+    for (;;) {
+      TESSERA_ASSIGN_OR_RETURN(const size_t count, Read(rest));
+      if (count < rest.size()) {
+        return absl::OkStatus();
+      }
+    }
   }
   [[nodiscard]] bool seekable() const override { return entry_.seekable; }
   [[nodiscard]] absl::Status Seek(uint64_t position) override {

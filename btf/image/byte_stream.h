@@ -26,6 +26,10 @@ class ByteStream {
   // Seek is legal only if seekable(). Errors: INVALID_ARGUMENT beyond the end, UNAVAILABLE.
   [[nodiscard]] virtual bool seekable() const = 0;
   [[nodiscard]] virtual absl::Status Seek(uint64_t position) = 0;
+
+  // To be called by readers that have all they want: media with a checksum over the file read on to its end
+  // and check it. Errors: DATA_LOSS.
+  [[nodiscard]] virtual absl::Status Finish() { return absl::OkStatus(); }
 };
 
 // Borrows `bytes`.

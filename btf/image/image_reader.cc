@@ -40,6 +40,7 @@ class PeekedStream : public ByteStream {
   [[nodiscard]] absl::Status Seek(uint64_t /*position*/) override {
     return absl::InvalidArgumentError("stream cannot seek");
   }
+  [[nodiscard]] absl::Status Finish() override { return stream_->Finish(); }
 
  private:
   std::unique_ptr<ByteStream> stream_;

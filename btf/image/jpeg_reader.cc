@@ -88,7 +88,15 @@ class JpegReader : public ImageReader {
   }
 
   absl::Status ReadNextRows(int num_rows, std::span<std::byte> rows) override {
-    return ReadScanlines(num_rows, rows) ? absl::OkStatus() : error_;
+    if (!ReadScanlines(num_rows, rows)) {
+      return error_;
+    }
+    if (next_row_ + num_rows < header_.height) {
+      return absl::OkStatus();
+    }
+    // JPEG has no checksum of its own.
+    const absl::Status status = stream_->Finish();
+    return status.ok() ? status : absl::Status(status.code(), absl::StrCat(name_, ": ", status.message()));
   }
 
   bool ReadScanlines(int num_rows, std::span<std::byte> rows) {

@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <functional>
 #include <ostream>
+#include <stop_token>
 #include <string>
 #include <vector>
 
@@ -12,27 +13,13 @@
 #include <gtest/gtest.h>
 
 #include "tests/support/btf_files.h"
+#include "tests/support/read_btf.h"
 
 namespace tessera {
 namespace {
 
-using ::testing::HasSubstr;
-
 std::unique_ptr<MemoryBtf> SmallBtf() {
   return AsymmetricBtf(19, 13, WholeDegreeDirections(2, 4), WholeDegreeDirections(1, 5));
-}
-
-std::vector<float> AllSamples(BtfSource& source, int rows_at_a_time = 4) {
-  std::vector<float> samples(source.info().height * source.SamplesPerRow());
-  for (int y = 0; y < source.info().height; y += rows_at_a_time) {
-    const int num_rows = std::min(rows_at_a_time, source.info().height - y);
-    const absl::Status status = source.ReadRows(
-        y, num_rows,
-        std::span(samples).subspan(y * source.SamplesPerRow(), num_rows * source.SamplesPerRow()),
-        RunContext{});
-    EXPECT_TRUE(status.ok()) << status;
-  }
-  return samples;
 }
 
 void ExpectSameDirections(std::span<const Direction> actual, std::span<const Direction> expected) {
@@ -195,6 +182,114 @@ TEST_P(LayoutTest, LightsComeFromWhereTheShadingSaysTheyDo) {
     EXPECT_GT(value(1, i, 0), value(0, i, 0) + 0.2);  // light at the right
     EXPECT_GT(value(0, i, 2), value(1, i, 2) + 0.2);  // light at the left
   }
+}
+
+TEST(ImportTest, TransferScaleAndProvenanceAreApplied) {
+  CodeImage gray(2, 1, 1);
+  gray.at(0, 0, 0) = 128;
+  gray.at(1, 0, 0) = 255;
+  CodeImage colour(2, 1, 3);
+  colour.at(0, 0, 1) = 128;
+  const ScratchFolder folder;
+  WriteFolder(
+      {{"a.png", MakePng(gray, 8)},
+       {"b.png", MakePng(colour, 8)},
+       {"manifest.json", R"({"transfer": "linear", "source": "s", "licence": "l", "citation": "c", "images": [
+                 {"file": "a.png", "lightPolarDeg": 0, "lightAzimuthDeg": 0, "viewPolarDeg": 0, "viewAzimuthDeg": 0},
+                 {"file": "b.png", "lightPolarDeg": 9, "lightAzimuthDeg": -90, "viewPolarDeg": 0,
+                  "viewAzimuthDeg": 77, "scale": 2.5}]})"}},
+      folder.path());
+  const double x = 128.0 / 255.0;
+  const auto manifest = ImportBtf(folder.path(), {.provenance = {.licence = "mine"}}, RunContext{});
+  ASSERT_TRUE(manifest.ok()) << manifest.status();
+  EXPECT_EQ((*manifest)->info().provenance.source, "s");
+  EXPECT_EQ((*manifest)->info().provenance.licence, "mine");
+  EXPECT_EQ((*manifest)->info().provenance.citation, "c");
+  EXPECT_THAT((*manifest)->info().radiometry, testing::HasSubstr("transfer linear"));
+  EXPECT_THAT((*manifest)->info().radiometry, testing::HasSubstr("scale"));
+  ASSERT_EQ((*manifest)->info().views.size(), 1u);  // azimuths at the pole are one direction
+  EXPECT_NEAR((*manifest)->info().lights[1].phi_rad, RadFromDeg(270.0), 1e-12);
+  const std::vector<float> samples = AllSamples(**manifest);  // [x][channel][light]
+  EXPECT_FLOAT_EQ(samples[0], x);
+  EXPECT_FLOAT_EQ(samples[2], x);  // gray in every channel
+  EXPECT_FLOAT_EQ(samples[4], x);
+  EXPECT_FLOAT_EQ(samples[1], 0.0);
+  EXPECT_FLOAT_EQ(samples[3], 2.5 * x);
+  EXPECT_FLOAT_EQ(samples[6], 1.0);
+
+  const auto gamma =
+      ImportBtf(folder.path(), {.transfer = Transfer{TransferKind::kGamma, 2.2}}, RunContext{});
+  ASSERT_TRUE(gamma.ok());
+  EXPECT_FLOAT_EQ(AllSamples(**gamma)[0], std::pow(x, 2.2));
+}
+
+TEST(ImportTest, ImagesOfSeveralTypesAreStoredAsLinearValues) {
+  const auto btf = AsymmetricBtf(9, 7, {{0.0, 0.0}}, WholeDegreeDirections(1, 5));
+  FileMap files = ManifestFiles(*btf, TestImageKind::kPng8, ManifestKind::kCsv);
+  files["images/1_0.png"] = MakeBtfImage(*btf, 0, 1, TestImageKind::kExrFloat);  // the bytes say what it is
+  files["images/2_0.png"] = MakeBtfImage(*btf, 0, 2, TestImageKind::kPng16);
+  const ScratchFolder folder;
+  WriteFolder(files, folder.path());
+  const auto source = ImportBtf(folder.path(), {}, RunContext{});
+  ASSERT_TRUE(source.ok()) << source.status();
+  ExpectSameBtf(**source, *btf, 1.0 / 65535);
+  EXPECT_THAT((*source)->info().radiometry, testing::HasSubstr("srgb for PNG and JPEG, linear for EXR"));
+}
+
+TEST(ImportTest, EveryBudgetAndNumberOfThreadsGivesTheSameSamples) {
+  const auto btf = AsymmetricBtf(72, 50, WholeDegreeDirections(1, 8), WholeDegreeDirections(2, 10));
+  const ScratchFolder folder;
+  WriteZip(Ubo2003Files(*btf, TestImageKind::kPng8, ""), folder.path() / "a.zip", ZipPacking::kDeflated);
+  std::vector<float> first;
+  for (const uint64_t budget : {uint64_t{512} << 20, uint64_t{5} << 20, kMinImportBudgetBytes}) {
+    for (const int num_threads : {1, 2, 8}) {
+      RunContext context;
+      context.num_threads = num_threads;
+      auto source = ImportBtf(folder.path() / "a.zip", {.memory_budget_bytes = budget}, context);
+      ASSERT_TRUE(source.ok()) << source.status();
+      const std::vector<float> samples = AllSamples(**source, 7, num_threads);
+      if (first.empty()) {
+        first = samples;
+        ExpectSameBtf(**source, *btf, kExact);
+      }
+      ASSERT_TRUE(samples == first) << budget << " bytes, " << num_threads << " threads";
+    }
+  }
+}
+
+TEST(ImportTest, ImagesBeyondTheBudgetAreReadInBands) {
+  const auto btf = AsymmetricBtf(640, 600, {{0.0, 0.0}}, WholeDegreeDirections(1, 3));  // 1.15 MB an image
+  for (const TestImageKind kind : {TestImageKind::kPng8, TestImageKind::kExrFloat}) {
+    const ScratchFolder folder;
+    WriteFolder(Ubo2003Files(*btf, kind, ""), folder.path());
+    auto source = ImportBtf(folder.path(), {.memory_budget_bytes = kMinImportBudgetBytes}, RunContext{});
+    ASSERT_TRUE(source.ok()) << source.status();
+    ExpectSameBtf(**source, *btf, kExact);
+  }
+}
+
+TEST(ImportTest, ReadRowsChecksItsArguments) {
+  const auto btf = SmallBtf();
+  const ScratchFolder folder;
+  WriteFolder(Ubo2003Files(*btf, TestImageKind::kPng8, ""), folder.path());
+  auto source = ImportBtf(folder.path(), {}, RunContext{});
+  ASSERT_TRUE(source.ok());
+  std::vector<float> row((*source)->SamplesPerRow());
+  EXPECT_TRUE((*source)->ReadRows(12, 1, row, RunContext{}).ok());
+  EXPECT_EQ((*source)->ReadRows(13, 1, row, RunContext{}).code(), absl::StatusCode::kInvalidArgument);
+  EXPECT_EQ((*source)->ReadRows(-1, 1, row, RunContext{}).code(), absl::StatusCode::kInvalidArgument);
+  EXPECT_EQ((*source)->ReadRows(0, 2, row, RunContext{}).code(), absl::StatusCode::kInvalidArgument);
+  std::stop_source stop;
+  stop.request_stop();
+  EXPECT_EQ((*source)->ReadRows(0, 1, row, RunContext{.stop = stop.get_token()}).code(),
+            absl::StatusCode::kCancelled);
+}
+
+TEST(ImportTest, LayoutNames) {
+  EXPECT_EQ(ParseImportLayout("exr").value(), ImportLayout::kExr);
+  EXPECT_EQ(ParseImportLayout("ubo2003").value(), ImportLayout::kUbo2003);
+  EXPECT_THAT(std::string(ParseImportLayout("btf").status().message()),
+              testing::HasSubstr("ubo2003, manifest"));
 }
 
 }  // namespace
