@@ -9,7 +9,7 @@
 namespace tessera {
 namespace {
 
-constexpr int kWaves = 128;
+constexpr int kWavePairs = 64;
 
 int WrapIndex(int64_t i, int n) {
   const auto wrapped = static_cast<int>(i % n);
@@ -21,6 +21,26 @@ std::array<float, 4> CatmullRom(float t) {
   const float t3 = t2 * t;
   return {0.5F * (-t3 + 2.0F * t2 - t), 0.5F * (3.0F * t3 - 5.0F * t2 + 2.0F),
           0.5F * (-3.0F * t3 + 4.0F * t2 + t), 0.5F * (t3 - t2)};
+}
+
+void AddWave(PeriodicField& field, double periods_x, double periods_y, double phase, float amplitude) {
+  const int n = field.n;
+  std::vector<float> cos_x(n);
+  std::vector<float> sin_x(n);
+  for (int i = 0; i < n; ++i) {
+    const double angle = 2.0 * kPi * periods_x * i / n + phase;
+    cos_x[i] = static_cast<float>(std::cos(angle));
+    sin_x[i] = static_cast<float>(std::sin(angle));
+  }
+  for (int j = 0; j < n; ++j) {
+    const double angle = 2.0 * kPi * periods_y * j / n;
+    const float cos_y = amplitude * static_cast<float>(std::cos(angle));
+    const float sin_y = amplitude * static_cast<float>(std::sin(angle));
+    float* row = field.values.data() + static_cast<size_t>(j) * n;
+    for (int i = 0; i < n; ++i) {
+      row[i] += cos_y * cos_x[i] - sin_y * sin_x[i];
+    }
+  }
 }
 
 }  // namespace
@@ -46,27 +66,19 @@ float PeriodicField::Cubic(double x, double y) const {
 PeriodicField BandNoise(int n, double wavelength, double bandwidth, uint64_t seed) {
   PeriodicField field(n);
   Rng rng(seed);
-  std::vector<float> cos_x(n);
-  std::vector<float> sin_x(n);
-  const auto amplitude = static_cast<float>(std::sqrt(2.0 / kWaves));
-  for (int wave = 0; wave < kWaves; ++wave) {
-    const double angle = (wave + rng.NextDouble()) * kPi / kWaves;
+  const auto amplitude = static_cast<float>(std::sqrt(2.0 / (2 * kWavePairs)));
+  const double centre_x = rng.NextDouble();
+  const double centre_y = rng.NextDouble();
+  for (int pair = 0; pair < kWavePairs; ++pair) {
+    const double angle = (pair + rng.NextDouble()) * kPi / kWavePairs;
     const double length = wavelength * (1.0 + bandwidth * (2.0 * rng.NextDouble() - 1.0));
+    const double periods_x = std::round(n / length * std::cos(angle));
+    const double periods_y = std::round(n / length * std::sin(angle));
     const double phase = 2.0 * kPi * rng.NextDouble();
-    const double kx = 2.0 * kPi / n * std::round(n / length * std::cos(angle));
-    const double ky = 2.0 * kPi / n * std::round(n / length * std::sin(angle));
-    for (int i = 0; i < n; ++i) {
-      cos_x[i] = static_cast<float>(std::cos(kx * i + phase));
-      sin_x[i] = static_cast<float>(std::sin(kx * i + phase));
-    }
-    for (int j = 0; j < n; ++j) {
-      const float cos_y = amplitude * static_cast<float>(std::cos(ky * j));
-      const float sin_y = amplitude * static_cast<float>(std::sin(ky * j));
-      float* row = field.values.data() + static_cast<size_t>(j) * n;
-      for (int i = 0; i < n; ++i) {
-        row[i] += cos_y * cos_x[i] - sin_y * sin_x[i];
-      }
-    }
+    AddWave(field, periods_x, periods_y, phase, amplitude);
+    // The same field, turned about a point of its own: waves that round to the same periods add up alike.
+    const double turned_phase = phase + 2.0 * kPi * (-periods_y * centre_x + periods_x * centre_y);
+    AddWave(field, -periods_y, periods_x, turned_phase, amplitude);
   }
   return field;
 }

@@ -19,9 +19,9 @@ struct PeriodicField {
   [[nodiscard]] float Cubic(double x, double y) const;
 };
 
-// Gaussian-like noise of mean 0 and variance 1: plane waves of whole periods per n, their directions
-// stratified over the half circle, their wavelengths (in samples) within a factor 1 +- bandwidth of
-// `wavelength`. Its statistics are the same in every direction, up to rounding to whole periods.
+// Gaussian-like noise of mean 0 and variance 1: plane waves of whole periods per n, in pairs at right angles,
+// their directions stratified over the half circle, their wavelengths (in samples) within a factor 1 +-
+// bandwidth of `wavelength`. The pairs make the spectrum equal to its own quarter turn, for every seed.
 [[nodiscard]] PeriodicField BandNoise(int n, double wavelength, double bandwidth, uint64_t seed);
 
 // Points of the n x n torus no two of which are closer than `distance`, thrown until 64 candidates per
