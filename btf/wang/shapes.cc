@@ -22,7 +22,7 @@ constexpr int kTorusMinorQuads = 14;
 constexpr double kTorusMajorRadius = 0.7;
 constexpr double kTorusMinorRadius = 0.3;
 constexpr int kCubeQuads = 10;          // along each edge of the cube
-constexpr uint32_t kGenus3Quads = 560;  // about
+constexpr uint32_t kGenus3Quads = 600;  // about
 constexpr int kGenus3Smoothings = 3;
 
 QuadMesh MakePlane() {

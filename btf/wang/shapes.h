@@ -3,7 +3,7 @@
 //   plane        [-1, 1] x [-1, 1] x 0, 16 x 16 quads, facing +z
 //   torus        radii 0.7 and 0.3 about the y axis, 32 x 14 quads
 //   cube-sphere  6 x 10 x 10 quads on the unit sphere, at equal angles
-//   genus3       a smooth solid with three holes, three-fold symmetric about the z axis, 576 quads
+//   genus3       a smooth solid with three holes, three-fold symmetric about the z axis, 528 quads
 //
 // `plane` and `torus` carry one consistent frame, so `plane-16` dresses them without breaks.
 #pragma once

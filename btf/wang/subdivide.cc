@@ -44,6 +44,15 @@ double Median(std::vector<double>& values) {
   return *middle;
 }
 
+// `length` to 8 significant bits, so that chords which differ by rounding alone are split alike and a
+// symmetric mesh stays symmetric.
+double Rounded(double length) {
+  constexpr double kScale = 256.0;
+  int exponent = 0;
+  const double mantissa = std::frexp(length, &exponent);
+  return std::ldexp(std::max(1.0, std::round(mantissa * kScale)) / kScale, exponent);
+}
+
 // The n that brings length / n nearest to `target` in ratio: the least n with length <= target sqrt(n (n +
 // 1)).
 uint32_t PartsFor(double length, double target) {
@@ -128,14 +137,15 @@ std::vector<uint32_t> ChordCounts(const QuadMesh& mesh, const Chords& chords, ui
     }
   }
   std::vector<double> lengths(chords.num_chords);
-  std::transform(of_chord.begin(), of_chord.end(), lengths.begin(), Median);
+  std::transform(of_chord.begin(), of_chord.end(), lengths.begin(),
+                 [](std::vector<double>& edges) { return Rounded(Median(edges)); });
 
   const uint64_t limit = kMaxMeshQuads;
   if (target_quads != 0) {
     return CountsForQuads(chords, lengths, std::min<uint64_t>(target_quads, limit), limit);
   }
   const uint64_t quads = mesh.quads.size();
-  std::vector<uint32_t> counts = CountsFor(lengths, Median(all));
+  std::vector<uint32_t> counts = CountsFor(lengths, Rounded(Median(all)));
   const uint64_t result = SubdividedQuads(chords, counts);
   if (result < kDefaultTargetQuads) {
     return CountsForQuads(chords, lengths, kDefaultTargetQuads, limit);
