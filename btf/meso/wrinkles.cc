@@ -42,7 +42,7 @@ absl::StatusOr<SurfaceMaps> MakeWrinkles(const MapParams& params, const RunConte
       const double y = j + 1.2 * cells * warp_y.values[vertex];
       const float fold = Grain(folds.Cubic(x, y), 0.55F);
       const float grain = Grain(grains.Cubic(x, y), 0.38F);
-      const float h = 0.50F * fold + 0.50F * grain * (0.6F + 0.4F * fold);
+      const float h = 0.38F * fold + 0.62F * grain * (0.75F + 0.25F * fold);
       maps.height[vertex] = h + 0.015F * pores.values[vertex];
       LinearRgb albedo = Mix(kCrease, kHide, SmoothStep(0.12F, 0.62F, h));
       albedo =

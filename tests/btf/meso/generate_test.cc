@@ -8,7 +8,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "btf/image/image_io.h"
 #include "tests/btf/meso/small_fields.h"
+#include "tests/support/test_data.h"
 
 namespace tessera {
 namespace {
@@ -133,6 +135,36 @@ TEST(GenerateTest, StopsInEveryStage) {
   stop.request_stop();
   std::vector<float> rows((*source)->SamplesPerRow());
   EXPECT_EQ((*source)->ReadRows(0, 1, rows, {.stop = stop.get_token()}).code(), absl::StatusCode::kCancelled);
+}
+
+// Photographed maps as artists have them: JPEG, colour in sRGB, height and roughness linear.
+TEST(GenerateTest, TracesMapsReadFromFiles) {
+  TESSERA_REQUIRE_DATA("textures/Rock031");
+  const auto read = [](const std::string& what, Transfer transfer) {
+    auto image = ReadImage(TestData("textures/Rock031/Rock031_1K-JPG_" + what + ".jpg"), transfer);
+    EXPECT_TRUE(image.ok()) << image.status();
+    return image.ok() ? *std::move(image) : Image();
+  };
+  GenerateParams params = SmallParams("weave");
+  params.kind = "heightmap";
+  params.size = 64;
+  params.height = read("Displacement", Transfer::Linear());
+  params.colour = read("Color", Transfer::Srgb());
+  params.roughness = read("Roughness", Transfer::Linear());
+  auto source = GenerateBtf(params, {});
+  ASSERT_TRUE(source.ok()) << source.status();
+  const std::vector<float> samples = ReadAll(**source);
+  double colour_mean = 0.0;
+  for (const float value : params.colour->pixels) {
+    colour_mean += value / static_cast<double>(params.colour->pixels.size());
+  }
+  // Seen and lit along the normal, it is about as bright as its colour.
+  double mean = 0.0;
+  for (size_t texel_channel = 0; texel_channel < size_t{64} * 64 * 3; ++texel_channel) {
+    mean += samples[texel_channel * 6] / (64.0 * 64.0 * 3.0);
+  }
+  EXPECT_GT(mean, 0.7 * colour_mean);
+  EXPECT_LT(mean, 1.3 * colour_mean + 0.04);
 }
 
 TEST(GenerateTest, NamesTheParameterItRefuses) {
