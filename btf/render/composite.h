@@ -1,0 +1,19 @@
+// A picture with coverage over a background.
+#pragma once
+
+#include <absl/status/statusor.h>
+
+#include "btf/image/image.h"
+
+namespace tessera {
+
+// Linear RGB of the top and bottom row; rows between blend linearly.
+struct Background {
+  float top[3] = {0.30f, 0.31f, 0.33f};
+  float bottom[3] = {0.13f, 0.13f, 0.14f};
+};
+
+// RGB: alpha * picture + (1 - alpha) * background. Errors: INVALID_ARGUMENT when `picture` is not RGBA.
+[[nodiscard]] absl::StatusOr<Image> CompositeOver(const Image& picture, const Background& background);
+
+}  // namespace tessera

@@ -1,0 +1,67 @@
+// What both renderers of a preview share: the checked scene, its triangles, its view and how a pixel is
+// sampled. Everything that makes a value (frames, filtering, decoding) they do apart.
+//
+// A pixel has four samples, in a rotated grid. The covered samples of one face form a group, shaded once at
+// the mean of their (s, q) under that point's frame, view and light:
+//   bilinearly, when they lie within kBilinearRadiusTexels of their mean (up to two texels a pixel);
+//   else as the mean of the texels that the samples lie in, which filters what a footprint of 2 x 2 texels
+//   would miss.
+// The pixel is the mean over its covered samples; alpha is their share.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include <absl/status/status.h>
+#include <Eigen/Core>
+
+#include "btf/render/preview.h"
+
+namespace tessera {
+
+inline constexpr int kSamplesPerPixel = 4;
+// From the pixel centre, in pixels, x right and y down.
+inline constexpr std::array<std::array<double, 2>, kSamplesPerPixel> kSampleOffsets = {
+    {{-0.125, -0.375}, {0.375, -0.125}, {-0.375, 0.125}, {0.125, 0.375}}};
+// The samples lie 0.395 pixels from the centre: 0.8 texels are reached at two texels a pixel.
+inline constexpr double kBilinearRadiusTexels = 0.8;
+
+inline constexpr int kLeastPreviewSide = 16;
+inline constexpr int kMostPreviewSide = 8192;
+inline constexpr size_t kMostPreviewLights = 64;
+
+// Errors: INVALID_ARGUMENT naming the member of `scene`, its value and the limit.
+[[nodiscard]] absl::Status CheckScene(const PreviewScene& scene);
+
+struct SurfaceVertex {
+  Eigen::Vector3f position;  // relative to SurfaceTriangles::centre
+  Eigen::Vector2f st;        // (s, q) of the face
+  uint32_t face = 0;
+};
+
+// Each face cut into cells x cells bilinear patches of two triangles: enough that (s, q), linear in a
+// triangle, follows a skewed face. The same number for every face, so that no edge has a vertex on one side
+// only.
+struct SurfaceTriangles {
+  Eigen::Vector3d centre;  // of the bounding box
+  double radius = 0.0;     // of the bounding sphere about it
+  int cells = 1;
+  std::vector<SurfaceVertex> vertices;
+  std::vector<uint32_t> indices;  // counter-clockwise seen from the front
+};
+[[nodiscard]] SurfaceTriangles TriangulateSurface(const QuadMesh& mesh);
+
+// The camera as an orthonormal frame, with the depth range that holds the surface.
+struct ViewFrame {
+  Eigen::Vector3d eye;
+  Eigen::Vector3d right;
+  Eigen::Vector3d up;
+  Eigen::Vector3d back;  // from the target to the eye
+  double tan_half_fov_y = 0.0;
+  double near = 0.0;
+  double far = 0.0;
+};
+[[nodiscard]] ViewFrame MakeViewFrame(const Camera& camera, const SurfaceTriangles& triangles);
+
+}  // namespace tessera

@@ -1,0 +1,276 @@
+#include "btf/render/preview_shaders.h"
+
+#include <absl/strings/str_cat.h>
+#include <absl/strings/str_format.h>
+
+#include "btf/render/preview_scene.h"
+#include "btf/render/surface.h"
+
+namespace tessera {
+namespace {
+
+constexpr char kSurfaceVertex[] = R"(#version 450 core
+layout(location = 0) in vec3 position;
+layout(location = 1) in vec2 st;
+layout(location = 2) in uint face;
+uniform mat4 clip_from_surface;
+uniform vec2 sample_shift;  // in clip space
+out vec2 point_st;
+flat out uint point_face;
+void main() {
+  gl_Position = clip_from_surface * vec4(position, 1.0);
+  gl_Position.xy += sample_shift * gl_Position.w;
+  point_st = st;
+  point_face = face;
+}
+)";
+
+// Face number plus one, the top bit set on its back; 0 where nothing is seen.
+constexpr char kSurfaceFragment[] = R"(#version 450 core
+in vec2 point_st;
+flat in uint point_face;
+out uvec4 surface_sample;
+void main() {
+  surface_sample = uvec4((point_face + 1u) | (gl_FrontFacing ? 0u : 0x80000000u),
+                         floatBitsToUint(point_st), 0u);
+}
+)";
+
+constexpr char kShadeVertex[] = R"(#version 450 core
+void main() {
+  gl_Position = vec4(vec2((gl_VertexID << 1) & 2, gl_VertexID & 2) * 2.0 - 1.0, 0.0, 1.0);
+}
+)";
+
+// llvmpipe runs both sides of every `if` under a mask but leaves loops early, so what costs much stands in
+// loops whose length is 0 where there is nothing to do.
+constexpr char kShadeFragment[] = R"(
+uniform usampler2DArray surface_samples;
+uniform samplerBuffer face_corners;  // 8 a face: four positions, four normals
+uniform isamplerBuffer face_links;   // 2 a face: faces across the tile's sides; (tile, turns, sides, turns)
+uniform usamplerBuffer tile_index;
+uniform int tile_size;
+uniform vec3 eye;
+uniform vec4 light;  // w = 0: unit direction to it, 1: its position
+uniform vec3 irradiance_by_pi;
+out vec4 pixel;
+
+vec3 NormalizedOr(vec3 v, vec3 otherwise) {
+  float squared = dot(v, v);
+  return squared > 1e-24 ? v * inversesqrt(squared) : otherwise;
+}
+
+vec3 AnyPerpendicular(vec3 n) {
+  return normalize(cross(abs(n.x) < 0.6 ? vec3(1.0, 0.0, 0.0) : vec3(0.0, 1.0, 0.0), n));
+}
+
+vec3 Bilinear(vec3 v0, vec3 v1, vec3 v2, vec3 v3, vec2 st) {
+  return mix(mix(v0, v1, st.x), mix(v3, v2, st.x), st.y);
+}
+
+// A direction of the unturned frame's plane from the turned one's, or (s, q) about the centre.
+vec2 Unturned(vec2 v, int turns) {
+  vec2 odd = (turns & 1) != 0 ? vec2(v.y, -v.x) : v;
+  return (turns & 2) != 0 ? -odd : odd;
+}
+
+// One side's proposal, perpendicular to n and turned back by the side's number.
+vec3 Proposal(vec3 edge, vec3 n, int side) {
+  vec3 along = NormalizedOr(edge - dot(edge, n) * n, AnyPerpendicular(n));
+  vec3 odd = (side & 1) != 0 ? cross(along, n) : along;
+  return (side & 2) != 0 ? -odd : odd;
+}
+
+// The texel of a tile position, one step beyond a side allowed: (BTFel, turns).
+ivec2 Texel(int face, ivec4 links, ivec2 at) {
+  int side = -1, position = 0;
+  if (at.y >= tile_size) { side = 0; position = at.x; }
+  else if (at.x >= tile_size) { side = 1; position = tile_size - 1 - at.y; }
+  else if (at.y < 0) { side = 2; position = tile_size - 1 - at.x; }
+  else if (at.x < 0) { side = 3; position = at.y; }
+  int turns = 0;
+  int tile = links.x;
+  if (side >= 0) {
+    ivec4 faces = texelFetch(face_links, 2 * face);
+    int across = side < 2 ? (side == 0 ? faces.x : faces.y) : (side == 2 ? faces.z : faces.w);
+    if (across >= 0) {
+      tile = texelFetch(face_links, 2 * across + 1).x;
+      turns = (links.w >> (2 * side)) & 3;
+      int other = (links.z >> (2 * side)) & 3;
+      int back = tile_size - 1;
+      int p = back - position;
+      at = other == 0 ? ivec2(p, back) : other == 1 ? ivec2(back, back - p)
+         : other == 2 ? ivec2(back - p, 0) : ivec2(0, p);
+    }
+  }
+  at = clamp(at, ivec2(0), ivec2(tile_size - 1));
+  uint texel = texelFetch(tile_index, (tile * tile_size + at.y) * tile_size + at.x).x;
+  return ivec2(int(texel & 0x3fffffffu), (int(texel >> 30) + turns) & 3);
+}
+
+// Value times irradiance / pi at a point of the front of a face. members: how many of `samples` to read as
+// single texels, 0 for a bilinear footprint at st.
+vec3 Shade(int face, vec2 st, int members, mat4x2 samples) {
+  vec3 p0 = texelFetch(face_corners, 8 * face).xyz;
+  vec3 p1 = texelFetch(face_corners, 8 * face + 1).xyz;
+  vec3 p2 = texelFetch(face_corners, 8 * face + 2).xyz;
+  vec3 p3 = texelFetch(face_corners, 8 * face + 3).xyz;
+  vec3 n = Bilinear(texelFetch(face_corners, 8 * face + 4).xyz, texelFetch(face_corners, 8 * face + 5).xyz,
+                    texelFetch(face_corners, 8 * face + 6).xyz, texelFetch(face_corners, 8 * face + 7).xyz, st);
+  n = NormalizedOr(n, NormalizedOr(cross(p2 - p0, p3 - p1), vec3(0.0, 0.0, 1.0)));
+  vec3 position = Bilinear(p0, p1, p2, p3, st);
+
+  vec3 a0 = Proposal(p1 - p0, n, 0), a1 = Proposal(p2 - p1, n, 1);
+  vec3 a2 = Proposal(p3 - p2, n, 2), a3 = Proposal(p0 - p3, n, 3);
+  vec3 t = NormalizedOr(a0 + a1 + a2 + a3, a0);
+  vec3 b = cross(n, t);
+  vec4 weight = 1.0 / max(vec4(st.y, 1.0 - st.x, 1.0 - st.y, st.x), 1e-6);
+  vec4 angle = vec4(atan(dot(a0, b), dot(a0, t)), atan(dot(a1, b), dot(a1, t)),
+                    atan(dot(a2, b), dot(a2, t)), atan(dot(a3, b), dot(a3, t)));
+  float blended = dot(weight, angle) / dot(weight, vec4(1.0));
+  t = cos(blended) * t + sin(blended) * b;
+  b = cross(n, t);
+
+  ivec4 links = texelFetch(face_links, 2 * face + 1);
+  vec3 to_light = light.xyz;
+  float falloff = 1.0;
+  if (light.w != 0.0) {
+    to_light -= position;
+    float squared = max(dot(to_light, to_light), 1e-24);
+    falloff = 1.0 / squared;
+    to_light *= inversesqrt(squared);
+  }
+  vec3 to_eye = normalize(eye - position);
+  vec3 local_light = vec3(Unturned(vec2(dot(to_light, t), dot(to_light, b)), links.y), dot(to_light, n));
+  vec3 local_view = vec3(Unturned(vec2(dot(to_eye, t), dot(to_eye, b)), links.y), dot(to_eye, n));
+  if (local_view.z < kLeastViewCosine) {
+    local_view = normalize(vec3(local_view.xy, kLeastViewCosine));
+  }
+
+  ivec4 btfels = ivec4(0), turns = ivec4(0);
+  vec4 weights = vec4(0.0);
+  if (members == 0) {
+    vec2 uv = clamp(Unturned(st - 0.5, links.y) + 0.5, 0.0, 1.0);
+    vec2 at = vec2(uv.x, 1.0 - uv.y) * float(tile_size) - 0.5;
+    ivec2 first = ivec2(floor(at));
+    vec2 f = at - vec2(first);
+    ivec2 second = first + 1;
+    weights = vec4((1.0 - f.x) * (1.0 - f.y), f.x * (1.0 - f.y), (1.0 - f.x) * f.y, f.x * f.y);
+    ivec2 at0 = first, at1 = ivec2(second.x, first.y), at2 = ivec2(first.x, second.y), at3 = second;
+    bvec2 below = lessThan(first, ivec2(0));
+    if ((below.x || second.x >= tile_size) && (below.y || second.y >= tile_size)) {
+      // Beyond a vertex: the own corner texel and the two across its sides.
+      ivec2 own = clamp(first, ivec2(0), ivec2(tile_size - 1));
+      vec2 crossing = vec2(below.x ? 1.0 - f.x : f.x, below.y ? 1.0 - f.y : f.y);
+      vec2 share = crossing * max(0.5 - crossing.yx, 0.0);
+      float h = share.x + share.y > 0.0 ? share.x / (share.x + share.y) : 0.5;
+      vec2 across = crossing * vec2(h, 1.0 - h);
+      at0 = own;
+      at1 = ivec2(below.x ? -1 : tile_size, own.y);
+      at2 = ivec2(own.x, below.y ? -1 : tile_size);
+      at3 = own;
+      weights = vec4(1.0 - across.x - across.y, across.x, across.y, 0.0);
+    }
+    ivec2 x0 = Texel(face, links, at0), x1 = Texel(face, links, at1);
+    ivec2 x2 = Texel(face, links, at2), x3 = Texel(face, links, at3);
+    btfels = ivec4(x0.x, x1.x, x2.x, x3.x);
+    turns = ivec4(x0.y, x1.y, x2.y, x3.y);
+  } else {
+    for (int i = 0; i < 4; ++i) {
+      vec2 uv = Unturned(samples[i] - 0.5, links.y) + 0.5;
+      ivec2 at = clamp(ivec2(floor(vec2(uv.x, 1.0 - uv.y) * float(tile_size))), ivec2(0),
+                       ivec2(tile_size - 1));
+      ivec2 x = Texel(face, links, at);
+      btfels[i] = x.x;
+      turns[i] = x.y;
+      weights[i] = i < members ? 1.0 / float(members) : 0.0;
+    }
+  }
+
+  // Texels of equal turn are blended as coefficients, the groups after decoding.
+  vec3 value = vec3(0.0);
+  ivec4 pending = local_light.z > 0.0 ? ivec4(greaterThan(weights, vec4(0.0))) : ivec4(0);
+  while (pending.x + pending.y + pending.z + pending.w > 0) {
+    int turn = pending.x > 0 ? turns.x : pending.y > 0 ? turns.y : pending.z > 0 ? turns.z : turns.w;
+    ivec4 group = ivec4(0);
+    vec4 group_weights = vec4(0.0);
+    int count = 0;
+    for (int i = 0; i < 4; ++i) {
+      if (pending[i] > 0 && turns[i] == turn) {
+        group[count] = btfels[i];
+        group_weights[count] = weights[i];
+        pending[i] = 0;
+        ++count;
+      }
+    }
+    value += BlendBtfels(group, group_weights, count,
+                         vec3(Unturned(local_light.xy, turn), local_light.z),
+                         vec3(Unturned(local_view.xy, turn), local_view.z));
+  }
+  return max(value, vec3(0.0)) * irradiance_by_pi * falloff;
+}
+
+void main() {
+  ivec2 at = ivec2(gl_FragCoord.xy);
+  uvec4 faces;
+  mat4x2 st;
+  int covered = 0;
+  for (int i = 0; i < 4; ++i) {
+    uvec4 texel = texelFetch(surface_samples, ivec3(at, i), 0);
+    faces[i] = texel.x;
+    st[i] = uintBitsToFloat(texel.yz);
+    covered += texel.x != 0u ? 1 : 0;
+  }
+  vec3 sum = vec3(0.0);
+  ivec4 pending = ivec4(notEqual(faces, uvec4(0u)));
+  while (pending.x + pending.y + pending.z + pending.w > 0) {
+    uint face = pending.x > 0 ? faces.x : pending.y > 0 ? faces.y : pending.z > 0 ? faces.z : faces.w;
+    mat4x2 samples = mat4x2(0.0);
+    vec2 mean = vec2(0.0);
+    int count = 0;
+    for (int i = 0; i < 4; ++i) {
+      if (pending[i] > 0 && faces[i] == face) {
+        samples[count] = st[i];
+        mean += st[i];
+        pending[i] = 0;
+        ++count;
+      }
+    }
+    mean /= float(count);
+    float squared = 0.0;
+    for (int i = 0; i < 4; ++i) {
+      vec2 offset = (samples[i] - mean) * float(tile_size);
+      squared = max(squared, i < count ? dot(offset, offset) : 0.0);
+    }
+    bool bilinear = squared <= kBilinearRadiusTexels * kBilinearRadiusTexels;
+    // The back of a face shows nothing.
+    int fronts = (face & 0x80000000u) == 0u ? 1 : 0;
+    for (int i = 0; i < fronts; ++i) {
+      sum += float(count) * Shade(int(face) - 1, mean, bilinear ? 0 : count, samples);
+    }
+  }
+  pixel = covered > 0 ? vec4(sum / float(covered), 0.25 * float(covered)) : vec4(0.0);
+}
+)";
+
+}  // namespace
+
+std::string SurfaceVertexShader() {
+  return kSurfaceVertex;
+}
+std::string SurfaceFragmentShader() {
+  return kSurfaceFragment;
+}
+std::string ShadeVertexShader() {
+  return kShadeVertex;
+}
+
+std::string ShadeFragmentShader(const std::string& codec_source) {
+  static_assert(kSamplesPerPixel == 4, "the shader unpacks four samples");
+  return absl::StrCat("#version 450 core\n",
+                      absl::StrFormat("const float kLeastViewCosine = %.9e;\n", kLeastViewCosine),
+                      absl::StrFormat("const float kBilinearRadiusTexels = %.9e;\n", kBilinearRadiusTexels),
+                      codec_source, kShadeFragment);
+}
+
+}  // namespace tessera

@@ -1,0 +1,17 @@
+// The two programs of a preview, as text. Semantics: preview_scene.h and surface.h.
+//
+// The first draws the surface into a buffer of (face, s, q) per sample; the second shades each pixel from its
+// four samples, so that the costly decoding runs once a pixel and never on hidden surfaces.
+#pragma once
+
+#include <string>
+
+namespace tessera {
+
+[[nodiscard]] std::string SurfaceVertexShader();
+[[nodiscard]] std::string SurfaceFragmentShader();
+[[nodiscard]] std::string ShadeVertexShader();
+// `codec_source` is CodecGlsl::source.
+[[nodiscard]] std::string ShadeFragmentShader(const std::string& codec_source);
+
+}  // namespace tessera

@@ -1,0 +1,24 @@
+// The double-precision picture with what tests need beside it.
+#pragma once
+
+#include <vector>
+
+#include <absl/status/statusor.h>
+
+#include "btf/render/preview.h"
+
+namespace tessera {
+
+struct ReferencePicture {
+  Image image;
+  // [height][width], depth along the view axis of the nearest and the farthest sample of each pixel; infinity
+  // where a sample sees nothing. Silhouettes are where these jump.
+  std::vector<double> nearest;
+  std::vector<double> farthest;
+};
+
+// Errors as RenderReference.
+[[nodiscard]] absl::StatusOr<ReferencePicture> RenderReferenceWithDepth(const PreviewScene& scene,
+                                                                        const RunContext& context);
+
+}  // namespace tessera
