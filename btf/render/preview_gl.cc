@@ -303,6 +303,7 @@ void PreviewDrawing::Shade(const Light& light, int first_row, int num_rows) {
       GlmFromEigen(is_point ? Eigen::Vector3d(light.place - triangles_.centre) : light.place.normalized());
   const glm::vec3 irradiance = GlmFromEigen(light.irradiance / kPi);
   gl_.Uniform1i(location("tile_size"), scene_.tile_set->tile_size);
+  gl_.Uniform1i(location("nearest"), scene_.filter == Filter::kNearest ? 1 : 0);
   gl_.Uniform3fv(location("eye"), 1, &eye[0]);
   gl_.Uniform4f(location("light"), place.x, place.y, place.z, is_point ? 1.0f : 0.0f);
   gl_.Uniform3fv(location("irradiance_by_pi"), 1, &irradiance[0]);

@@ -6,6 +6,7 @@
 //   bilinearly, when they lie within kBilinearRadiusTexels of their mean (up to two texels a pixel);
 //   else as the mean of the texels that the samples lie in, which filters what a footprint of 2 x 2 texels
 //   would miss.
+// With Filter::kNearest a group shows the one texel that its mean lies in.
 // The pixel is the mean over its covered samples; alpha is their share.
 #pragma once
 

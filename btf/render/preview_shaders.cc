@@ -50,6 +50,7 @@ uniform samplerBuffer face_corners;  // 8 a face: four positions, four normals
 uniform isamplerBuffer face_links;   // 2 a face: faces across the tile's sides; (tile, turns, sides, turns)
 uniform usamplerBuffer tile_index;
 uniform int tile_size;
+uniform bool nearest;
 uniform vec3 eye;
 uniform vec4 light;  // w = 0: unit direction to it, 1: its position
 uniform vec3 irradiance_by_pi;
@@ -178,7 +179,7 @@ vec3 Shade(int face, vec2 st, int members, mat4x2 samples) {
   } else {
     for (int i = 0; i < 4; ++i) {
       vec2 uv = Unturned(samples[i] - 0.5, links.y) + 0.5;
-      ivec2 at = clamp(ivec2(floor(vec2(uv.x, 1.0 - uv.y) * float(tile_size))), ivec2(0),
+      ivec2 at = clamp(ivec2(floor(vec2(uv.x, 1.0 - uv.y) * float(tile_size) + kNearestShiftTexels)), ivec2(0),
                        ivec2(tile_size - 1));
       ivec2 x = Texel(face, links, at);
       btfels[i] = x.x;
@@ -245,8 +246,13 @@ void main() {
     bool bilinear = squared <= kBilinearRadiusTexels * kBilinearRadiusTexels;
     // The back of a face shows nothing.
     int fronts = (face & 0x80000000u) == 0u ? 1 : 0;
+    int members = bilinear ? 0 : count;
+    if (nearest) {
+      samples[0] = mean;
+      members = 1;
+    }
     for (int i = 0; i < fronts; ++i) {
-      sum += float(count) * Shade(int(face) - 1, mean, bilinear ? 0 : count, samples);
+      sum += float(count) * Shade(int(face) - 1, mean, members, samples);
     }
   }
   pixel = covered > 0 ? vec4(sum / float(covered), 0.25 * float(covered)) : vec4(0.0);
@@ -269,6 +275,7 @@ std::string ShadeFragmentShader(const std::string& codec_source) {
   static_assert(kSamplesPerPixel == 4, "the shader unpacks four samples");
   return absl::StrCat("#version 450 core\n",
                       absl::StrFormat("const float kLeastViewCosine = %.9e;\n", kLeastViewCosine),
+                      absl::StrFormat("const float kNearestShiftTexels = %.9e;\n", kNearestShiftTexels),
                       absl::StrFormat("const float kBilinearRadiusTexels = %.9e;\n", kBilinearRadiusTexels),
                       codec_source, kShadeFragment);
 }

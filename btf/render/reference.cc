@@ -135,7 +135,9 @@ class Shader {
       radius = std::max(radius, std::hypot(sample.s - mean.s, sample.q - mean.q));
     }
     Taps taps = {};
-    if (radius * surface_.tile_set().tile_size <= kBilinearRadiusTexels) {
+    if (scene_.filter == Filter::kNearest) {
+      taps[0] = surface_.NearestTap(mean);
+    } else if (radius * surface_.tile_set().tile_size <= kBilinearRadiusTexels) {
       taps = surface_.BilinearTaps(mean);
     } else {
       for (size_t i = 0; i < samples.size(); ++i) {

@@ -212,8 +212,8 @@ Taps DressedSurface::BilinearTaps(const SurfacePoint& point) const {
 Tap DressedSurface::NearestTap(const SurfacePoint& point) const {
   const int w = binding_.tile_size;
   const Eigen::Vector2d uv = TileFromFace(point.s, point.q, binding_.dressing->turns[point.face]);
-  const int x = std::clamp(static_cast<int>(std::floor(uv.x() * w)), 0, w - 1);
-  const int y = std::clamp(static_cast<int>(std::floor((1.0 - uv.y()) * w)), 0, w - 1);
+  const int x = std::clamp(static_cast<int>(std::floor(uv.x() * w + kNearestShiftTexels)), 0, w - 1);
+  const int y = std::clamp(static_cast<int>(std::floor((1.0 - uv.y()) * w + kNearestShiftTexels)), 0, w - 1);
   return TapAt(point.face, x, y);
 }
 

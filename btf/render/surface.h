@@ -52,6 +52,10 @@ using Taps = std::array<Tap, 4>;  // weights sum to 1
 // decoded as if seen at this cosine, so that outlines are not lined with black.
 inline constexpr double kLeastViewCosine = 1e-3;
 
+// Symmetric views put samples exactly on the borders of texels, where rounding would choose the texel. This
+// breaks such ties the same way everywhere, and is far from the fractions that pixels and texels form.
+inline constexpr double kNearestShiftTexels = 0.0037;
+
 // Immutable, safe to share between threads. Borrows the dressing and the tile set.
 class DressedSurface {
  public:
@@ -74,7 +78,7 @@ class DressedSurface {
   // so that on either side (p or q = 1/2) both faces read the same two texels with the same weights.
   [[nodiscard]] Taps BilinearTaps(const SurfacePoint& point) const;
 
-  // The texel that the point lies in.
+  // The texel that the point, moved by kNearestShiftTexels along the tile's columns and rows, lies in.
   [[nodiscard]] Tap NearestTap(const SurfacePoint& point) const;
 
   [[nodiscard]] const Dressing& dressing() const { return *binding_.dressing; }

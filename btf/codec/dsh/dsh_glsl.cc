@@ -261,16 +261,24 @@ absl::StatusOr<CodecGlsl> DshGlsl(const BtfelTable& table) {
     CopyBasis(basis_view, layout.kv, layout.view_basis_begin(), &glsl.shared_values);
   }
 
-  glsl.words_per_btfel = layout.kv * layout.btfel_row_texels() * 4;
-  glsl.btfel_words.assign(table.size() * glsl.words_per_btfel, 0);
+  std::vector<uint32_t> order;  // of the codes in a BTFel's words: coefficient by [j][n]
+  for (int j = 0; j < layout.kv; ++j) {
+    for (int n = 0; n < row_codes; ++n) {
+      order.push_back(static_cast<uint32_t>(coefficient(j, n)));
+    }
+  }
+  const int row_words = layout.btfel_row_texels() * 4;
+  glsl.words_per_btfel = layout.kv * row_words;
+  glsl.btfel_words.resize(table.size() * glsl.words_per_btfel);
   for (size_t btfel = 0; btfel < table.size(); ++btfel) {
     const uint8_t* codes = table.codes.data() + btfel * k;
     uint32_t* words = glsl.btfel_words.data() + btfel * glsl.words_per_btfel;
     for (int j = 0; j < layout.kv; ++j) {
+      const uint32_t* row_order = order.data() + static_cast<ptrdiff_t>(j) * row_codes;
       for (int n = 0; n < row_codes; ++n) {
-        words[n / 4] |= static_cast<uint32_t>(codes[coefficient(j, n)]) << (8 * (n % 4));
+        words[n / 4] |= static_cast<uint32_t>(codes[row_order[n]]) << (8 * (n % 4));
       }
-      words += layout.btfel_row_texels() * 4;
+      words += row_words;
     }
   }
   return glsl;

@@ -5,6 +5,7 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <Eigen/Geometry>
 
 #include "btf/render/composite.h"
 #include "btf/render/offscreen_context.h"
@@ -85,6 +86,8 @@ TEST_F(PreviewTest, GlMatchesTheReferenceOnSkewedQuadsMagnifiedAndMinified) {
     scene.camera.eye = {0.6, -1.3, 1.8};
     scene.camera.fov_y_rad = RadFromDeg(60.0);
     scene.lights.push_back({.kind = Light::Kind::kPoint, .place = {-0.5, 0.2, 1.0}});
+    ExpectAgreement(scene);
+    scene.filter = Filter::kNearest;
     ExpectAgreement(scene);
   }
 }

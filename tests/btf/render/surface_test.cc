@@ -1,6 +1,7 @@
 #include "btf/render/surface.h"
 
 #include <gtest/gtest.h>
+#include <Eigen/Geometry>
 
 #include "btf/wang/quad_mesh.h"
 #include "tests/btf/render/hand_made.h"
