@@ -104,12 +104,12 @@ TEST_F(PreviewTest, GlMatchesTheReferenceFromInsideASolid) {
     normal = -normal;
   }
   const TileSet tile_set = RandomTileSet(RandomBtfels(50, 9, 9, 2), 16, 3);
-  PreviewScene scene{.dressing = &dressing, .tile_set = &tile_set, .width = 64, .height = 48};
+  PreviewScene scene{.dressing = &dressing, .tile_set = &tile_set, .width = 32, .height = 24};
   scene.camera.eye = {0.1, 0.05, 0.2};
   scene.camera.target = {0.3, 0.2, -1.0};
   scene.lights = {{.kind = Light::Kind::kPoint, .place = {0.2, 0.1, 0.3}}};
   const ReferencePicture reference = ExpectAgreement(scene);
-  EXPECT_EQ(reference.image.at(32, 24)[3], 1.0f);
+  EXPECT_EQ(reference.image.at(16, 12)[3], 1.0f);
 }
 
 TEST_F(PreviewTest, AWhiteDiffuserReadsOneWhenLitAlongItsNormal) {
