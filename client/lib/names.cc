@@ -5,7 +5,8 @@
 
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_split.h>
-#include <absl/strings/strip.h>
+
+#include "proto/wire/status.h"
 
 namespace tessera {
 namespace {
@@ -23,9 +24,10 @@ bool IsName(std::string_view text) {
 }
 
 absl::Status BadName(std::string_view what, std::string_view name, std::string_view form) {
-  return absl::InvalidArgumentError(absl::StrCat(AbslView(what), " name \"", AbslView(name), "\": expected ",
-                                                 AbslView(form), ", each part 1 to ", kLongestName,
-                                                 " of a-z, 0-9 and -"));
+  return WithReason(absl::InvalidArgumentError(absl::StrCat(
+                        AbslView(what), " name \"", AbslView(name), "\": expected ", AbslView(form),
+                        ", each part 1 to ", kLongestName, " of a-z, 0-9 and -")),
+                    "NAME_INVALID", name);
 }
 
 // `name`, with or without `prefix`, as prefix + one name.

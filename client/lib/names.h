@@ -12,7 +12,8 @@
 
 namespace tessera {
 
-// Full names are accepted as they are. Errors: INVALID_ARGUMENT quoting the name and the legal form.
+// Full names are accepted as they are. Errors: INVALID_ARGUMENT with reason NAME_INVALID, quoting the name
+// and the legal form.
 [[nodiscard]] absl::StatusOr<std::string> FullMaterialName(std::string_view name);
 [[nodiscard]] absl::StatusOr<std::string> FullArrangementName(std::string_view name);
 [[nodiscard]] absl::StatusOr<std::string> FullTileSetName(std::string_view name);
