@@ -1,0 +1,195 @@
+// tessera mesh dress | redress | info
+#include <chrono>
+#include <filesystem>
+#include <memory>
+
+#include <fmt/format.h>
+
+#include "btf/base/status_macros.h"
+#include "btf/wang/arrangement.h"
+#include "btf/wang/dress.h"
+#include "btf/wang/mesh_io.h"
+#include "btf/wang/mesh_topology.h"
+#include "btf/wang/redress.h"
+#include "btf/wang/shapes.h"
+#include "client/cli/arguments.h"
+#include "client/cli/commands.h"
+#include "client/cli/describe.h"
+#include "client/lib/atomic_file.h"
+#include "client/lib/names.h"
+
+namespace tessera::cli {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+double MillisecondsSince(Clock::time_point begin) {
+  return std::chrono::duration<double, std::milli>(Clock::now() - begin).count();
+}
+
+std::span<const std::byte> BytesOf(const std::string& text) {
+  return std::as_bytes(std::span(text));
+}
+
+absl::StatusOr<QuadMesh> ReadMesh(Session& session, const std::string& mesh) {
+  if (const std::optional<std::string> shape = BuiltinName(mesh)) {
+    return BuiltinShape(*shape);
+  }
+  MeshReadNotes notes;
+  TESSERA_ASSIGN_OR_RETURN(QuadMesh read, ReadQuadMesh(mesh, &notes));
+  if (notes.faces_turned + notes.vertices_split + notes.vertices_dropped > 0) {
+    session.Note(fmt::format("{}: {} faces turned, {} vertices doubled, {} unused vertices left out", mesh,
+                             notes.faces_turned, notes.vertices_split, notes.vertices_dropped));
+  }
+  return read;
+}
+
+struct DressFlags {
+  std::string mesh;
+  std::string arrangement;
+  uint64_t seed = 1;
+  bool allow_breaks = false;
+  uint32_t target_quads = 0;
+  bool on_server = false;
+  std::string output;
+};
+
+void AnswerDressed(Session& session, const DressFlags& flags, uint64_t num_quads, uint64_t num_breaks) {
+  const std::vector<StageTime> stages = session.FinishStages();
+  session.Answer({{"file", flags.output}, {"num_quads", num_quads}, {"num_breaks", num_breaks}},
+                 fmt::format("{}: {} quads, {} breaks", flags.output, num_quads, num_breaks));
+}
+
+absl::Status DressHere(Session& session, const DressFlags& flags) {
+  TESSERA_ASSIGN_OR_RETURN(const Arrangement* arrangement, FindArrangement(flags.arrangement));
+  TESSERA_ASSIGN_OR_RETURN(const QuadMesh mesh, ReadMesh(session, flags.mesh));
+  const DressParams params{
+      .seed = flags.seed, .allow_breaks = flags.allow_breaks, .target_quads = flags.target_quads};
+  TESSERA_ASSIGN_OR_RETURN(const DressResult result,
+                           DressMesh(mesh, *arrangement, params, session.Context()));
+  TESSERA_ASSIGN_OR_RETURN(const std::string bytes, SerializeDressing(result.dressing));
+  TESSERA_RETURN_IF_ERROR(WriteFileAtomically(flags.output, bytes));
+  AnswerDressed(session, flags, result.dressing.tile.size(), result.breaks.size());
+  return absl::OkStatus();
+}
+
+absl::Status DressThere(Session& session, const DressFlags& flags) {
+  v1::DressMeshRequest request;
+  TESSERA_ASSIGN_OR_RETURN(*request.mutable_arrangement(), FullArrangementName(flags.arrangement));
+  TESSERA_ASSIGN_OR_RETURN(Client * client, session.Connect());
+  const RunContext context = session.Context();
+  if (const std::optional<std::string> shape = BuiltinName(flags.mesh)) {
+    request.set_builtin(*shape);
+  } else {
+    TESSERA_ASSIGN_OR_RETURN(const v1::Blob blob, client->UploadFile(flags.mesh, context));
+    request.set_mesh_sha256(blob.sha256());
+  }
+  request.set_seed(flags.seed);
+  request.set_allow_breaks(flags.allow_breaks);
+  request.set_target_quads(flags.target_quads);
+  TESSERA_ASSIGN_OR_RETURN(const v1::DressMeshResponse response, client->DressMesh(request, context));
+  TESSERA_RETURN_IF_ERROR(client->DownloadFile(response.dressing(), flags.output, context));
+  AnswerDressed(session, flags, response.num_quads(), response.num_breaks());
+  return absl::OkStatus();
+}
+
+struct RedressFlags {
+  std::string dressing;
+  std::string tile_set;
+};
+
+absl::Status RunRedress(Session& session, const RedressFlags& flags) {
+  TESSERA_ASSIGN_OR_RETURN(const std::string dressing_bytes, ReadWholeFile(flags.dressing));
+  TESSERA_ASSIGN_OR_RETURN(const Dressing dressing, ParseDressing(BytesOf(dressing_bytes)));
+  const auto begin = Clock::now();
+  TileSet tile_set;
+  // A file that was pulled needs no server.
+  if (std::filesystem::path(flags.tile_set).extension() == ".tsra") {
+    TESSERA_ASSIGN_OR_RETURN(const std::string bytes, ReadWholeFile(flags.tile_set));
+    TESSERA_ASSIGN_OR_RETURN(tile_set, ParseTileSet(BytesOf(bytes)));
+  } else {
+    TESSERA_ASSIGN_OR_RETURN(const std::string name, FullTileSetName(flags.tile_set));
+    TESSERA_ASSIGN_OR_RETURN(Client * client, session.Connect());
+    TESSERA_ASSIGN_OR_RETURN(tile_set, client->FetchTileSet(name, session.Context()));
+  }
+  const double fetch_ms = MillisecondsSince(begin);
+  const auto bind_begin = Clock::now();
+  TESSERA_ASSIGN_OR_RETURN(const Binding binding, Redress(dressing, tile_set));
+  const double bind_ms = MillisecondsSince(bind_begin);
+  session.FinishStages();
+  session.Answer({{"dressing", flags.dressing},
+                  {"tile_set", flags.tile_set},
+                  {"num_quads", binding.texels.size()},
+                  {"tile_size", binding.tile_size},
+                  {"bind_ms", bind_ms},
+                  {"fetch_ms", fetch_ms},
+                  {"total_ms", fetch_ms + bind_ms}},
+                 fmt::format("{} quads bound to {} in {:.3f} ms ({:.1f} ms with getting the tile set)",
+                             binding.texels.size(), flags.tile_set, bind_ms, fetch_ms + bind_ms));
+  return absl::OkStatus();
+}
+
+absl::Status RunInfo(Session& session, const std::string& path) {
+  TESSERA_ASSIGN_OR_RETURN(const QuadMesh mesh, ReadMesh(session, path));
+  TESSERA_ASSIGN_OR_RETURN(const MeshInfo info, DescribeMesh(mesh));
+  const Json value = {
+      {"mesh", path},
+      {"num_vertices", info.num_vertices},
+      {"num_quads", info.num_quads},
+      {"num_edges", info.num_edges},
+      {"num_components", info.num_components},
+      {"genus", info.genus},
+      {"num_boundary_loops", info.num_boundary_loops},
+      {"num_boundary_edges", info.num_boundary_edges},
+      {"num_irregular_vertices", info.num_irregular_vertices},
+      {"edge_length", {{"min", info.min_edge}, {"median", info.median_edge}, {"max", info.max_edge}}},
+      {"quad_area", {{"min", info.min_area}, {"median", info.median_area}, {"max", info.max_area}}},
+      {"box_min", {info.box_min.x(), info.box_min.y(), info.box_min.z()}},
+      {"box_max", {info.box_max.x(), info.box_max.y(), info.box_max.z()}}};
+  session.Answer(value, TextRecord(value));
+  return absl::OkStatus();
+}
+
+}  // namespace
+
+void AddMeshCommands(CLI::App& app, Session& session) {
+  CLI::App* noun = app.add_subcommand("mesh", "Quad meshes and their dressings");
+  noun->require_subcommand(1);
+
+  constexpr char kMeshHelp[] = "OBJ or OFF file of quads, or builtin:plane, torus, cube-sphere, genus3";
+  const auto dress_flags = std::make_shared<DressFlags>();
+  CLI::App* dress =
+      noun->add_subcommand("dress", "Give each quad a tile of an arrangement; done here, once per mesh");
+  dress->add_option("MESH", dress_flags->mesh, kMeshHelp)->required();
+  dress->add_option("--arrangement", dress_flags->arrangement, "plane-16 or surface-96")->required();
+  dress->add_option("--seed", dress_flags->seed, "Same seed, same dressing")->capture_default_str();
+  dress->add_flag("--allow-breaks", dress_flags->allow_breaks,
+                  "Accept edges where an unturned arrangement cannot match");
+  dress->add_option("--quads", dress_flags->target_quads,
+                    "Subdivide to about this many quads [built-in rule]");
+  dress->add_flag("--on-server", dress_flags->on_server, "Let the server do it");
+  dress->add_option("-o,--output", dress_flags->output, "File to write, .tsra")->required();
+  dress->callback([&session, dress_flags] {
+    session.run = [&session, dress_flags] {
+      return dress_flags->on_server ? DressThere(session, *dress_flags) : DressHere(session, *dress_flags);
+    };
+  });
+
+  const auto redress_flags = std::make_shared<RedressFlags>();
+  CLI::App* redress =
+      noun->add_subcommand("redress", "Bind a tile set to a dressing and print how long it took");
+  redress->add_option("DRESSING", redress_flags->dressing, "File of `mesh dress`")->required();
+  redress
+      ->add_option("--tileset", redress_flags->tile_set, "ARRANGEMENT/NAME, or a pulled file ending in .tsra")
+      ->required();
+  redress->callback([&session, redress_flags] {
+    session.run = [&session, redress_flags] { return RunRedress(session, *redress_flags); };
+  });
+
+  const auto mesh = std::make_shared<std::string>();
+  CLI::App* info = noun->add_subcommand("info", "Check a mesh and count what it is made of");
+  info->add_option("MESH", *mesh, kMeshHelp)->required();
+  info->callback([&session, mesh] { session.run = [&session, mesh] { return RunInfo(session, *mesh); }; });
+}
+
+}  // namespace tessera::cli

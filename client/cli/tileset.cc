@@ -1,0 +1,239 @@
+// tessera tileset synthesize | list | show | pull | certify | sheet | delete
+#include <memory>
+
+#include <fmt/format.h>
+
+#include "btf/base/status_macros.h"
+#include "btf/image/image_io.h"
+#include "btf/render/sheet.h"
+#include "client/cli/arguments.h"
+#include "client/cli/certificate.h"
+#include "client/cli/commands.h"
+#include "client/cli/describe.h"
+#include "client/lib/atomic_file.h"
+#include "client/lib/names.h"
+
+namespace tessera::cli {
+namespace {
+
+struct SynthesizeFlags {
+  std::string material;
+  std::string arrangement;
+  std::string name;
+  uint32_t tile_size = 64;
+  uint32_t strip_height = 16;
+  uint64_t seed = 1;
+  bool force = false;
+  bool detach = false;
+  bool replace = false;
+};
+
+std::string SummaryOf(const v1::TileSet& tile_set) {
+  return fmt::format("{}: {} tiles of {}x{} texels, strips {} high, {} BTFels, {}",
+                     ShortName(tile_set.name()), tile_set.num_tiles(), tile_set.tile_size(),
+                     tile_set.tile_size(), tile_set.strip_height(), tile_set.num_btfels(),
+                     FormatAmount(static_cast<double>(tile_set.blob().size_bytes()), "bytes"));
+}
+
+absl::Status RunSynthesize(Session& session, const SynthesizeFlags& flags) {
+  TESSERA_ASSIGN_OR_RETURN(const std::string material, FullMaterialName(flags.material));
+  const std::string own_name = flags.name.empty() ? ShortName(material) : flags.name;
+  TESSERA_ASSIGN_OR_RETURN(const std::string name, FullTileSetName(flags.arrangement + "/" + own_name));
+  TESSERA_ASSIGN_OR_RETURN(Client * client, session.Connect());
+  const RunContext context = session.Context();
+  v1::SynthesizeTileSetRequest request;
+  request.set_name(name);
+  request.set_material(material);
+  request.set_tile_size(flags.tile_size);
+  request.set_strip_height(flags.strip_height);
+  request.set_seed(flags.seed);
+  request.set_force(flags.force);
+  request.set_replace(flags.replace);
+  TESSERA_ASSIGN_OR_RETURN(const v1::Job job, client->SynthesizeTileSet(request, context));
+  if (flags.detach) {
+    session.Answer(Describe(job), ShortName(job.name()));
+    return absl::OkStatus();
+  }
+  TESSERA_ASSIGN_OR_RETURN(const v1::Job ended, client->WaitForJob(job.name(), OnStop::kCancelJob, context));
+  TESSERA_ASSIGN_OR_RETURN(const v1::TileSet tile_set, client->GetTileSet(ended.result_name(), context));
+  const std::vector<StageTime> stages = session.FinishStages();
+  const Json described = Describe(tile_set);
+  std::string text = SummaryOf(tile_set);
+  double total = 0;
+  for (const StageTime& stage : stages) {
+    text += fmt::format("\n{:<12} {:8.2f} s", stage.stage, stage.seconds);
+    total += stage.seconds;
+  }
+  text += fmt::format("\n{:<12} {:8.2f} s", "in all", total);
+  session.Answer(
+      {{"tile_set", described}, {"stages", Session::JsonOfStages(stages)}, {"job", ShortName(job.name())}},
+      text);
+  for (const std::string& warning : CertificateWarnings(described["certificate"])) {
+    session.Warn(fmt::format("{}: {}", ShortName(tile_set.name()), warning));
+  }
+  return absl::OkStatus();
+}
+
+absl::Status RunList(Session& session, const std::string& arrangement) {
+  std::string parent;
+  if (!arrangement.empty()) {
+    TESSERA_ASSIGN_OR_RETURN(parent, FullArrangementName(arrangement));
+  }
+  TESSERA_ASSIGN_OR_RETURN(Client * client, session.Connect());
+  TESSERA_ASSIGN_OR_RETURN(const std::vector<v1::TileSet> tile_sets,
+                           client->ListTileSets(parent, session.Context()));
+  Json all = Json::array();
+  std::vector<std::vector<std::string>> rows = {{"TILE SET", "TILES", "TEXELS", "STRIP", "BTFELS", "SIZE"}};
+  for (const v1::TileSet& tile_set : tile_sets) {
+    all.push_back(Describe(tile_set));
+    rows.push_back({ShortName(tile_set.name()), std::to_string(tile_set.num_tiles()),
+                    fmt::format("{}x{}", tile_set.tile_size(), tile_set.tile_size()),
+                    std::to_string(tile_set.strip_height()), std::to_string(tile_set.num_btfels()),
+                    FormatAmount(static_cast<double>(tile_set.blob().size_bytes()), "bytes")});
+  }
+  session.Answer({{"tile_sets", std::move(all)}}, TextTable(rows));
+  return absl::OkStatus();
+}
+
+absl::Status RunShow(Session& session, const std::string& name) {
+  TESSERA_ASSIGN_OR_RETURN(const std::string full_name, FullTileSetName(name));
+  TESSERA_ASSIGN_OR_RETURN(Client * client, session.Connect());
+  TESSERA_ASSIGN_OR_RETURN(const v1::TileSet tile_set, client->GetTileSet(full_name, session.Context()));
+  session.Answer(Describe(tile_set), TextRecord(Describe(tile_set)));
+  return absl::OkStatus();
+}
+
+absl::Status RunPull(Session& session, const std::string& name, const std::string& output) {
+  TESSERA_ASSIGN_OR_RETURN(const std::string full_name, FullTileSetName(name));
+  TESSERA_ASSIGN_OR_RETURN(Client * client, session.Connect());
+  const RunContext context = session.Context();
+  TESSERA_ASSIGN_OR_RETURN(const v1::TileSet tile_set, client->GetTileSet(full_name, context));
+  TESSERA_RETURN_IF_ERROR(client->DownloadFile(tile_set.blob(), output, context));
+  session.FinishStages();
+  session.Answer({{"file", output}, {"tile_set", Describe(tile_set)}}, output);
+  return absl::OkStatus();
+}
+
+absl::Status RunCertify(Session& session, const std::string& name) {
+  TESSERA_ASSIGN_OR_RETURN(const std::string full_name, FullTileSetName(name));
+  TESSERA_ASSIGN_OR_RETURN(Client * client, session.Connect());
+  TESSERA_ASSIGN_OR_RETURN(const v1::TileSet tile_set, client->GetTileSet(full_name, session.Context()));
+  const Json certificate = Describe(tile_set)["certificate"];
+  session.Answer({{"name", ShortName(full_name)}, {"certificate", certificate}}, TextRecord(certificate));
+  for (const std::string& warning : CertificateWarnings(certificate)) {
+    session.Warn(fmt::format("{}: {}", ShortName(full_name), warning));
+  }
+  return absl::OkStatus();
+}
+
+struct SheetFlags {
+  std::string name;
+  std::string light = "30,135";
+  std::string view = "0,0";
+  int columns = 0;
+  std::string output;
+};
+
+absl::Status RunSheet(Session& session, const SheetFlags& flags) {
+  TESSERA_ASSIGN_OR_RETURN(const std::string full_name, FullTileSetName(flags.name));
+  SheetParams params;
+  TESSERA_ASSIGN_OR_RETURN(params.light, ParseDirection(flags.light));
+  TESSERA_ASSIGN_OR_RETURN(params.view, ParseDirection(flags.view));
+  params.columns = flags.columns;
+  TESSERA_ASSIGN_OR_RETURN(const PictureFormat format, PictureFormatOf(flags.output));
+  TESSERA_ASSIGN_OR_RETURN(Client * client, session.Connect());
+  const RunContext context = session.Context();
+  TESSERA_ASSIGN_OR_RETURN(const TileSet tile_set, client->FetchTileSet(full_name, context));
+  TESSERA_ASSIGN_OR_RETURN(const Image sheet, RenderTileSheet(tile_set, params, context));
+  TESSERA_ASSIGN_OR_RETURN(const std::string bytes,
+                           format == PictureFormat::kPng ? EncodePng(sheet) : EncodeExr(sheet));
+  TESSERA_RETURN_IF_ERROR(WriteFileAtomically(flags.output, bytes));
+  session.FinishStages();
+  session.Answer({{"file", flags.output}, {"width", sheet.width}, {"height", sheet.height}}, flags.output);
+  return absl::OkStatus();
+}
+
+absl::Status RunDelete(Session& session, const std::string& name) {
+  TESSERA_ASSIGN_OR_RETURN(const std::string full_name, FullTileSetName(name));
+  TESSERA_ASSIGN_OR_RETURN(Client * client, session.Connect());
+  TESSERA_RETURN_IF_ERROR(client->DeleteTileSet(full_name, session.Context()));
+  session.Answer({{"deleted", ShortName(full_name)}}, "");
+  return absl::OkStatus();
+}
+
+void AddSynthesize(CLI::App& noun, Session& session) {
+  const auto flags = std::make_shared<SynthesizeFlags>();
+  CLI::App* command =
+      noun.add_subcommand("synthesize", "The tiles of a material in an arrangement, by the server");
+  command->add_option("MATERIAL", flags->material, "Name of the material")->required();
+  command->add_option("--arrangement", flags->arrangement, "plane-16 or surface-96")->required();
+  command->add_option("--name", flags->name, "Name of the tile set [the material's]");
+  command->add_option("--tile", flags->tile_size, "Texels per tile side, at least twice the strip")
+      ->capture_default_str();
+  command
+      ->add_option("--strip", flags->strip_height,
+                   "Height of the strips in texels: even, from 8; about a feature")
+      ->capture_default_str();
+  command->add_option("--seed", flags->seed, "Same seed, same tile set")->capture_default_str();
+  command->add_flag("--force", flags->force, "Turn strips of a material that is not isotropic all the same");
+  command->add_flag("--detach", flags->detach, "Print the job and return at once");
+  command->add_flag("--replace", flags->replace, "Take a name that exists");
+  command->callback(
+      [&session, flags] { session.run = [&session, flags] { return RunSynthesize(session, *flags); }; });
+}
+
+void AddSheet(CLI::App& noun, Session& session) {
+  const auto flags = std::make_shared<SheetFlags>();
+  CLI::App* command = noun.add_subcommand("sheet", "All tiles side by side in one picture");
+  command->add_option("TILESET", flags->name, "ARRANGEMENT/NAME")->required();
+  command->add_option("--light", flags->light, "TH,PH in degrees, TH from the normal")->capture_default_str();
+  command->add_option("--view", flags->view, "Likewise")->capture_default_str();
+  command->add_option("--columns", flags->columns, "Tiles a row [about square]");
+  command->add_option("-o,--output", flags->output, "File to write, .png (sRGB) or .exr (linear)")
+      ->required();
+  command->callback(
+      [&session, flags] { session.run = [&session, flags] { return RunSheet(session, *flags); }; });
+}
+
+}  // namespace
+
+void AddTileSetCommands(CLI::App& app, Session& session) {
+  CLI::App* noun =
+      app.add_subcommand("tileset", "Tiles of a material in an arrangement, named ARRANGEMENT/NAME");
+  noun->require_subcommand(1);
+  AddSynthesize(*noun, session);
+
+  const auto name = std::make_shared<std::string>();
+  const auto arrangement = std::make_shared<std::string>();
+  const auto output = std::make_shared<std::string>();
+  CLI::App* list = noun->add_subcommand("list", "Every tile set");
+  list->add_option("--arrangement", *arrangement, "Only those of this arrangement");
+  list->callback([&session, arrangement] {
+    session.run = [&session, arrangement] { return RunList(session, *arrangement); };
+  });
+
+  CLI::App* show = noun->add_subcommand("show", "One tile set, its source and its certificate");
+  show->add_option("TILESET", *name, "ARRANGEMENT/NAME")->required();
+  show->callback([&session, name] { session.run = [&session, name] { return RunShow(session, *name); }; });
+
+  CLI::App* pull = noun->add_subcommand("pull", "Download a tile set's container");
+  pull->add_option("TILESET", *name, "ARRANGEMENT/NAME")->required();
+  pull->add_option("-o,--output", *output, "File to write, .tsra")->required();
+  pull->callback([&session, name, output] {
+    session.run = [&session, name, output] { return RunPull(session, *name, *output); };
+  });
+
+  CLI::App* certify = noun->add_subcommand("certify", "The measured quality of the seams");
+  certify->add_option("TILESET", *name, "ARRANGEMENT/NAME")->required();
+  certify->callback(
+      [&session, name] { session.run = [&session, name] { return RunCertify(session, *name); }; });
+
+  AddSheet(*noun, session);
+
+  CLI::App* remove = noun->add_subcommand("delete", "Free the name");
+  remove->add_option("TILESET", *name, "ARRANGEMENT/NAME")->required();
+  remove->callback(
+      [&session, name] { session.run = [&session, name] { return RunDelete(session, *name); }; });
+}
+
+}  // namespace tessera::cli
