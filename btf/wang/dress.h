@@ -33,6 +33,8 @@ struct Break {
   uint8_t side = 0;   // of the face, not of the tile
   uint32_t other_face = 0;
   uint8_t other_side = 0;
+
+  friend bool operator==(const Break&, const Break&) = default;
 };
 
 struct DressResult {
