@@ -47,10 +47,10 @@ struct Embedding {
 };
 
 // GLSL of a codec. Declares
-//   vec3 BlendBtfels(ivec4 btfels, vec4 weights, int count, vec3 light, vec3 view)
-// the weighted sum of the first `count` BTFels' values, unclamped, under one pair of directions in their own,
-// unturned frame, with the semantics of Decoder::Evaluate; it reads the two buffer textures below through
-// texelFetch.
+//   vec3 BlendBtfels(ivec4 btfels, ivec4 turns, vec4 weights, int count, vec3 light, vec3 view)
+// the weighted sum of the first `count` BTFels' values, unclamped, each turned by its quarter turns, under
+// one pair of directions in the surface's frame, with the semantics of Decoder::Evaluate; it reads the two
+// buffer textures below through texelFetch.
 struct CodecGlsl {
   std::string source;
   int words_per_btfel = 0;

@@ -188,26 +188,8 @@ vec3 Shade(int face, vec2 st, int members, mat4x2 samples) {
     }
   }
 
-  // Texels of equal turn are blended as coefficients, the groups after decoding.
-  vec3 value = vec3(0.0);
-  ivec4 pending = local_light.z > 0.0 ? ivec4(greaterThan(weights, vec4(0.0))) : ivec4(0);
-  while (pending.x + pending.y + pending.z + pending.w > 0) {
-    int turn = pending.x > 0 ? turns.x : pending.y > 0 ? turns.y : pending.z > 0 ? turns.z : turns.w;
-    ivec4 group = ivec4(0);
-    vec4 group_weights = vec4(0.0);
-    int count = 0;
-    for (int i = 0; i < 4; ++i) {
-      if (pending[i] > 0 && turns[i] == turn) {
-        group[count] = btfels[i];
-        group_weights[count] = weights[i];
-        pending[i] = 0;
-        ++count;
-      }
-    }
-    value += BlendBtfels(group, group_weights, count,
-                         vec3(Unturned(local_light.xy, turn), local_light.z),
-                         vec3(Unturned(local_view.xy, turn), local_view.z));
-  }
+  // The sum is linear before its clamp, so blending as coefficients and after decoding are the same.
+  vec3 value = BlendBtfels(btfels, turns, weights, members == 0 ? 4 : members, local_light, local_view);
   return max(value, vec3(0.0)) * irradiance_by_pi * falloff;
 }
 

@@ -46,6 +46,44 @@ bool IsIdentity(const CodecTable& basis, int size) {
   return true;
 }
 
+// How the function of index l(l+1)+m changes under quarter turns t of the direction: the one of even m by a
+// sign, the one of odd m by a sign or, for odd t, into its partner (l, -m).
+enum class TurnClass { kSteady, kFlipped, kSwapped };  // |m| = 0, 2, odd modulo 4
+
+int OrderOf(int index) {
+  const int l = static_cast<int>(std::sqrt(static_cast<double>(index)));
+  return index - l * (l + 1);
+}
+
+TurnClass TurnClassOf(int index) {
+  const int m = std::abs(OrderOf(index));
+  return m % 2 == 1 ? TurnClass::kSwapped : m % 4 == 2 ? TurnClass::kFlipped : TurnClass::kSteady;
+}
+
+// The partner's index, and the sign it takes with one quarter turn.
+int PartnerOf(int index) {
+  return index - 2 * OrderOf(index);
+}
+int PartnerSign(int index) {
+  const int m = OrderOf(index);
+  return (std::abs(m) % 4 == 1) == (m > 0) ? 1 : -1;
+}
+
+// Whether the mapped functions turn as the plain ones do: each mixes only functions of its own order m, those
+// of -m alike.
+bool TurnsLikePlain(const CodecTable& basis, int size) {
+  for (int i = 0; i < size; ++i) {
+    for (int j = 0; j < size; ++j) {
+      const float value = basis.values[i * size + j];
+      if (OrderOf(i) != OrderOf(j) ? value != 0.0f
+                                   : value != basis.values[PartnerOf(i) * size + PartnerOf(j)]) {
+        return false;
+      }
+    }
+  }
+  return true;
+}
+
 absl::StatusOr<double> LargestPolarAngle(const std::vector<Direction>& directions, const char* what) {
   double largest = 0.0;
   for (const Direction& direction : directions) {
@@ -120,6 +158,7 @@ struct Layout {
   int kv = 0;
   bool plain_light = true;
   bool plain_view = true;
+  bool turns_like_plain = true;
 
   [[nodiscard]] int row_codes() const { return 3 * kl; }
   [[nodiscard]] int row_texels() const { return (row_codes() + 3) / 4; }
@@ -132,7 +171,13 @@ struct Layout {
   [[nodiscard]] int btfel_row_texels() const { return (row_codes() + kCodesPerTexel - 1) / kCodesPerTexel; }
 };
 
+// One weighted sum for BTFels of any turns. With y' = y(turned direction) and x = the partners with their
+// signs,
+//   y'_i = y_i (steady), e y_i (flipped), k y_i + s x_i (swapped),   e = 1 -1 1 -1, k = 1 0 -1 0, s = 0 1 0
+//   -1
+// by turn, so the codes are summed by class and the turn comes in once a row: tables and harmonics serve all.
 std::string Source(const Layout& layout) {
+  const auto component = [](int i) { return std::string(1, kComponent[i]); };
   std::string out;
   absl::StrAppend(&out, "uniform usamplerBuffer btfel_words;\nuniform samplerBuffer codec_values;\n");
   AppendHarmonics("LightHarmonics", layout.kl, &out);
@@ -142,65 +187,141 @@ vec3 ClampPolar(vec3 d, float cosine, float sine) {
   return d.z < cosine ? vec3(d.xy * (sine / length(d.xy)), cosine) : d;
 }
 
-vec3 BlendBtfels(ivec4 btfels, vec4 weights, int count, vec3 light, vec3 view) {
-  if (light.z <= 0.0 || view.z <= 0.0) {
-    return vec3(0.0);
-  }
+vec3 BlendTurned(ivec4 btfels, ivec4 turns, vec4 weights, int count, vec3 light, vec3 view) {
   vec4 q = texelFetch(codec_values, 0);
   float scale = light.z < q.x ? light.z / q.x : 1.0;
-  light = ClampPolar(light, q.x, q.y);
-  view = ClampPolar(view, q.z, q.w);
 )");
-  absl::StrAppend(&out, "  float yl[", layout.kl, "];\n  float yv[", layout.kv,
-                  "];\n  LightHarmonics(light, yl);\n  ViewHarmonics(view, yv);\n");
+  // A loop of no rows, since llvmpipe leaves loops early but not functions.
+  absl::StrAppend(&out, "  int rows = light.z > 0.0 && view.z > 0.0 && count > 0 ? ", layout.kv, " : 0;\n",
+                  "  light = ClampPolar(light, q.x, q.y);\n  view = ClampPolar(view, q.z, q.w);\n",
+                  "  float yl[", layout.kl, "];\n  float yv[", layout.kv, "];\n",
+                  "  LightHarmonics(light, yl);\n  ViewHarmonics(view, yv);\n");
   if (!layout.plain_light) {
     AppendChangeOfBasis("yl", layout.kl, layout.light_basis_begin(), &out);
   }
   if (!layout.plain_view) {
     AppendChangeOfBasis("yv", layout.kv, layout.view_basis_begin(), &out);
   }
+  // The view's functions by class, (steady, flipped, k part, s part), since rows are counted by a loop.
+  absl::StrAppend(&out, "  vec4 classes[", layout.kv, "];\n");
+  for (int j = 0; j < layout.kv; ++j) {
+    const std::string value = absl::StrCat("yv[", j, "]");
+    absl::StrAppend(&out, "  classes[", j, "] = vec4(");
+    switch (TurnClassOf(j)) {
+      case TurnClass::kSteady:
+        absl::StrAppend(&out, value, ", 0.0, 0.0, 0.0);\n");
+        break;
+      case TurnClass::kFlipped:
+        absl::StrAppend(&out, "0.0, ", value, ", 0.0, 0.0);\n");
+        break;
+      case TurnClass::kSwapped:
+        absl::StrAppend(&out, "0.0, 0.0, ", value, ", ", PartnerSign(j) < 0 ? "-" : "", "yv[", PartnerOf(j),
+                        "]);\n");
+        break;
+    }
+  }
   // The separable sum, view functions outermost: the light weights times the steps are made once a row and
   // serve every BTFel; the offsets need no BTFel at all. The inner lists are written out, so that llvmpipe
   // keeps them in registers; indexed by a loop they cost several times as much.
-  absl::StrAppend(&out, R"(
-  float total = 0.0;
-  for (int n = 0; n < count; ++n) {
-    total += weights[n];
-  }
-  vec3 sum = vec3(0.0);
-)");
-  absl::StrAppend(&out, "  for (int j = 0; j < ", layout.kv, "; ++j) {\n    int table = 1 + j * ",
-                  2 * layout.row_texels(), ";\n    float w[", layout.row_codes(),
-                  "];\n    vec3 offsets = vec3(0.0);\n");
+  absl::StrAppend(
+      &out, "  vec3 sum = vec3(0.0);\n  for (int j = 0; j < rows; ++j) {\n    int table = 1 + j * ",
+      2 * layout.row_texels(), ";\n    float w[", layout.row_codes(), "], wx[", layout.row_codes(),
+      "];\n    vec3 o0 = vec3(0.0), o2 = vec3(0.0), ok = vec3(0.0), os = vec3(0.0);\n");
+  const auto partner = [&](int i) {
+    return absl::StrCat(PartnerSign(i) < 0 ? "-" : "", "yl[", PartnerOf(i), "]");
+  };
   for (int texel = 0; texel < layout.row_texels(); ++texel) {
-    for (const bool steps : {true, false}) {
-      absl::StrAppend(&out, "    q = texelFetch(codec_values, table + ",
-                      steps ? texel : layout.row_texels() + texel, ");\n");
-      for (int n = 4 * texel; n < std::min(4 * texel + 4, layout.row_codes()); ++n) {
-        const std::string term =
-            absl::StrCat("q.", std::string(1, kComponent[n % 4]), " * yl[", n % layout.kl, "];\n");
-        if (steps) {
-          absl::StrAppend(&out, "    w[", n, "] = ", term);
-        } else {
-          absl::StrAppend(&out, "    offsets.", std::string(1, kComponent[n / layout.kl]), " += ", term);
-        }
+    const int end = std::min(4 * texel + 4, layout.row_codes());
+    absl::StrAppend(&out, "    q = texelFetch(codec_values, table + ", texel, ");\n");
+    for (int n = 4 * texel; n < end; ++n) {
+      const int i = n % layout.kl;
+      absl::StrAppend(&out, "    w[", n, "] = q.", component(n % 4), " * yl[", i, "];\n");
+      if (TurnClassOf(i) == TurnClass::kSwapped) {
+        absl::StrAppend(&out, "    wx[", n, "] = q.", component(n % 4), " * ", partner(i), ";\n");
+      }
+    }
+    absl::StrAppend(&out, "    q = texelFetch(codec_values, table + ", layout.row_texels() + texel, ");\n");
+    for (int n = 4 * texel; n < end; ++n) {
+      const int i = n % layout.kl;
+      const std::string channel = component(n / layout.kl);
+      const std::string offset = absl::StrCat("q.", component(n % 4), " * ");
+      const TurnClass turn_class = TurnClassOf(i);
+      const char* into = turn_class == TurnClass::kSteady    ? "o0."
+                         : turn_class == TurnClass::kFlipped ? "o2."
+                                                             : "ok.";
+      absl::StrAppend(&out, "    ", into, channel, " += ", offset, "yl[", i, "];\n");
+      if (turn_class == TurnClass::kSwapped) {
+        absl::StrAppend(&out, "    os.", channel, " += ", offset, partner(i), ";\n");
       }
     }
   }
-  absl::StrAppend(&out,
-                  "    vec3 row = total * offsets;\n    for (int n = 0; n < count; ++n) {\n"
-                  "      vec3 a = vec3(0.0);\n      uvec4 u;\n      int first = (btfels[n] * ",
-                  layout.kv, " + j) * ", layout.btfel_row_texels(), ";\n");
+  absl::StrAppend(&out, R"(
+    for (int n = 0; n < count; ++n) {
+      vec3 a0 = o0, a2 = o2, ak = ok, as = os;
+      uvec4 u;
+      float f;
+)");
+  absl::StrAppend(&out, "      int first = (btfels[n] * ", layout.kv, " + j) * ", layout.btfel_row_texels(),
+                  ";\n");
   for (int n = 0; n < layout.row_codes(); ++n) {
     if (n % kCodesPerTexel == 0) {
       absl::StrAppend(&out, "      u = texelFetch(btfel_words, first + ", n / kCodesPerTexel, ");\n");
     }
-    absl::StrAppend(&out, "      a.", std::string(1, kComponent[n / layout.kl]), " += float((u.",
-                    std::string(1, kComponent[(n % kCodesPerTexel) / 4]), " >> ", 8 * (n % 4),
-                    ") & 255u) * w[", n, "];\n");
+    const std::string channel = component(n / layout.kl);
+    const std::string code =
+        absl::StrCat("float((u.", component((n % kCodesPerTexel) / 4), " >> ", 8 * (n % 4), ") & 255u)");
+    switch (TurnClassOf(n % layout.kl)) {
+      case TurnClass::kSteady:
+        absl::StrAppend(&out, "      a0.", channel, " += ", code, " * w[", n, "];\n");
+        break;
+      case TurnClass::kFlipped:
+        absl::StrAppend(&out, "      a2.", channel, " += ", code, " * w[", n, "];\n");
+        break;
+      case TurnClass::kSwapped:
+        absl::StrAppend(&out, "      f = ", code, "; ak.", channel, " += f * w[", n, "]; as.", channel,
+                        " += f * wx[", n, "];\n");
+        break;
+    }
   }
-  absl::StrAppend(&out, "      row += weights[n] * a;\n    }\n    sum += yv[j] * row;\n  }\n",
-                  "  return scale * sum;\n}\n");
+  absl::StrAppend(&out, R"(
+      int turn = turns[n];
+      float e = (turn & 1) != 0 ? -1.0 : 1.0;
+      float k = turn == 0 ? 1.0 : turn == 2 ? -1.0 : 0.0;
+      float s = turn == 1 ? 1.0 : turn == 3 ? -1.0 : 0.0;
+      float y = dot(classes[j], vec4(1.0, e, k, s));
+      sum += (weights[n] * y) * (a0 + e * a2 + k * ak + s * as);
+    }
+  }
+  return scale * sum;
+}
+
+vec3 BlendBtfels(ivec4 btfels, ivec4 turns, vec4 weights, int count, vec3 light, vec3 view) {
+)");
+  if (layout.turns_like_plain) {
+    absl::StrAppend(&out, "  return BlendTurned(btfels, turns, weights, count, light, view);\n}\n");
+    return out;
+  }
+  // Functions that do not turn into each other: one sum for each turn, under the turned directions.
+  absl::StrAppend(&out, R"(
+  vec3 sum = vec3(0.0);
+  for (int turn = 0; turn < 4; ++turn) {
+    ivec4 group = ivec4(0);
+    vec4 group_weights = vec4(0.0);
+    int group_count = 0;
+    for (int n = 0; n < 4; ++n) {
+      if (n < count && turns[n] == turn) {
+        group[group_count] = btfels[n];
+        group_weights[group_count] = weights[n];
+        ++group_count;
+      }
+    }
+    sum += BlendTurned(group, ivec4(0), group_weights, group_count, light, view);
+    light.xy = vec2(light.y, -light.x);
+    view.xy = vec2(view.y, -view.x);
+  }
+  return sum;
+}
+)");
   return out;
 }
 
@@ -233,6 +354,7 @@ absl::StatusOr<CodecGlsl> DshGlsl(const BtfelTable& table) {
   const CodecTable& basis_view = table.tables.at("basis_view");
   layout.plain_light = IsIdentity(basis_light, layout.kl);
   layout.plain_view = IsIdentity(basis_view, layout.kv);
+  layout.turns_like_plain = TurnsLikePlain(basis_light, layout.kl) && TurnsLikePlain(basis_view, layout.kv);
 
   CodecGlsl glsl;
   glsl.source = Source(layout);

@@ -8,9 +8,9 @@
 
 namespace tessera {
 
-// For any table of codec "dsh-cls" or one of its relatives. The source depends on kl, kv, on whether the
-// bases are the identity and on the largest polar angles only, so that a compiled program serves many
-// materials. Errors: INVALID_ARGUMENT naming the table or parameter that is missing or misshapen.
+// For any table of codec "dsh-cls" or one of its relatives. The source depends only on kl, kv and on whether
+// the bases are the identity and turn like it, so that a compiled program serves many materials. Errors:
+// INVALID_ARGUMENT naming the table or parameter that is missing or misshapen.
 [[nodiscard]] absl::StatusOr<CodecGlsl> DshGlsl(const BtfelTable& table);
 
 }  // namespace tessera

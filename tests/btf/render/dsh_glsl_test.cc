@@ -12,12 +12,14 @@
 namespace tessera {
 namespace {
 
+using testing::BasisKind;
 using testing::RandomBtfels;
 
 constexpr int kQueries = 256;
 
 struct Query {
   std::array<int, 4> btfels;
+  std::array<int, 4> turns;
   std::array<float, 4> weights;
   int count = 0;
   Eigen::Vector3d light;
@@ -34,9 +36,10 @@ void main() { gl_Position = vec4(vec2((gl_VertexID << 1) & 2, gl_VertexID & 2) *
 uniform samplerBuffer queries;
 out vec4 result;
 void main() {
-  int first = 4 * int(gl_FragCoord.x);
-  vec4 light = texelFetch(queries, first + 2), view = texelFetch(queries, first + 3);
-  result = vec4(BlendBtfels(ivec4(texelFetch(queries, first)), texelFetch(queries, first + 1), int(light.w),
+  int first = 5 * int(gl_FragCoord.x);
+  vec4 light = texelFetch(queries, first + 3), view = texelFetch(queries, first + 4);
+  result = vec4(BlendBtfels(ivec4(texelFetch(queries, first)), ivec4(texelFetch(queries, first + 1)),
+                            texelFetch(queries, first + 2), int(light.w),
                             light.xyz, view.xyz), 1.0);
 }
 )";
@@ -49,6 +52,9 @@ void main() {
   for (const Query& q : queries) {
     for (const int btfel : q.btfels) {
       packed.push_back(static_cast<float>(btfel));
+    }
+    for (const int turns : q.turns) {
+      packed.push_back(static_cast<float>(turns));
     }
     packed.insert(packed.end(), q.weights.begin(), q.weights.end());
     for (int i = 0; i < 3; ++i) {
@@ -97,13 +103,13 @@ void main() {
 struct Size {
   int kl = 0;
   int kv = 0;
-  bool plain = true;
+  BasisKind basis = BasisKind::kIdentity;
 };
 
 class DshGlslTest : public ::testing::TestWithParam<Size> {};
 
 TEST_P(DshGlslTest, BlendsWhatTheDecoderBlends) {
-  const BtfelTable table = RandomBtfels(40, GetParam().kl, GetParam().kv, 11, GetParam().plain);
+  const BtfelTable table = RandomBtfels(40, GetParam().kl, GetParam().kv, 11, GetParam().basis);
   const auto decoder = MakeDecoder(table);
   ASSERT_TRUE(decoder.ok()) << decoder.status();
   const auto glsl = DshGlsl(table);
@@ -115,6 +121,7 @@ TEST_P(DshGlslTest, BlendsWhatTheDecoderBlends) {
   for (Query& q : queries) {
     for (int i = 0; i < 4; ++i) {
       q.btfels[i] = static_cast<int>(rng.NextBelow(table.size()));
+      q.turns[i] = static_cast<int>(rng.NextBelow(4));
       q.weights[i] = static_cast<float>(0.25 * rng.NextDouble());
     }
     q.count = static_cast<int>(rng.NextBelow(5));
@@ -139,7 +146,8 @@ TEST_P(DshGlslTest, BlendsWhatTheDecoderBlends) {
     std::vector<double> coefficients(table.num_coefficients);
     for (int i = 0; i < q.count; ++i) {
       (*decoder)->Dequantize(table.btfel(q.btfels[i]), coefficients);
-      expected += q.weights[i] * (*decoder)->Evaluate(coefficients, q.light, q.view);
+      expected += q.weights[i] * (*decoder)->Evaluate(coefficients, UnturnedFromTurned(q.light, q.turns[i]),
+                                                      UnturnedFromTurned(q.view, q.turns[i]));
     }
     lit += expected.abs().maxCoeff() > 0.01 ? 1 : 0;
     for (int c = 0; c < 3; ++c) {
@@ -152,10 +160,14 @@ TEST_P(DshGlslTest, BlendsWhatTheDecoderBlends) {
 
 INSTANTIATE_TEST_SUITE_P(Sizes, DshGlslTest,
                          ::testing::Values(Size{25, 25}, Size{1, 1}, Size{4, 1}, Size{9, 16}, Size{36, 4},
-                                           Size{49, 49}, Size{25, 9, false}),
+                                           Size{49, 49}, Size{25, 9, BasisKind::kGeneral},
+                                           Size{16, 25, BasisKind::kByOrder}),
                          [](const auto& info) {
                            return "kl" + std::to_string(info.param.kl) + "kv" +
-                                  std::to_string(info.param.kv) + (info.param.plain ? "" : "Mapped");
+                                  std::to_string(info.param.kv) +
+                                  (info.param.basis == BasisKind::kIdentity  ? ""
+                                   : info.param.basis == BasisKind::kByOrder ? "ByOrder"
+                                                                             : "General");
                          });
 
 TEST(DshGlsl, RefusesTablesThatDoNotFit) {

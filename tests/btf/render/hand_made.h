@@ -15,31 +15,40 @@
 
 namespace tessera::testing {
 
-// The identity, or a made-up invertible one, as a codec's basis.
-inline CodecTable Basis(int size, bool plain) {
+inline int Degree(int index) {
+  return static_cast<int>(std::sqrt(static_cast<double>(index)));
+}
+
+// Bases of a codec: the identity; functions that mix degrees but keep their order m, as orthonormalising over
+// the hemisphere does; anything invertible.
+enum class BasisKind { kIdentity, kByOrder, kGeneral };
+
+inline CodecTable Basis(int size, BasisKind kind) {
   CodecTable table{{size, size}, std::vector<float>(static_cast<size_t>(size) * size)};
+  const auto order = [](int index) { return index - Degree(index) * (Degree(index) + 1); };
   for (int i = 0; i < size; ++i) {
-    for (int j = 0; j <= i; ++j) {
-      table.values[i * size + j] =
-          i == j ? 1.0f : (plain ? 0.0f : 0.1f * std::sin(static_cast<float>(i + 3 * j)));
+    table.values[i * size + i] = 1.0f;
+    for (int j = 0; j < i; ++j) {
+      if (kind == BasisKind::kGeneral) {
+        table.values[i * size + j] = 0.1f * std::sin(static_cast<float>(i + 3 * j));
+      } else if (kind == BasisKind::kByOrder && order(i) == order(j)) {
+        table.values[i * size + j] = 0.2f * std::sin(static_cast<float>(Degree(i) + 3 * Degree(j)));
+      }
     }
   }
   return table;
 }
 
-inline int Degree(int index) {
-  return static_cast<int>(std::sqrt(static_cast<double>(index)));
-}
-
 // Smooth reflectance between about 0 and 1 that differs from BTFel to BTFel and with every direction.
-inline BtfelTable RandomBtfels(int count, int kl, int kv, uint64_t seed, bool plain = true) {
+inline BtfelTable RandomBtfels(int count, int kl, int kv, uint64_t seed,
+                               BasisKind basis = BasisKind::kIdentity) {
   BtfelTable table;
   table.codec_id = "dsh-cls";
   table.codec_version = 1;
   table.num_coefficients = 3 * kl * kv;
   table.parameters = {{"kl", kl}, {"kv", kv}};
-  table.tables["basis_light"] = Basis(kl, plain);
-  table.tables["basis_view"] = Basis(kv, plain);
+  table.tables["basis_light"] = Basis(kl, basis);
+  table.tables["basis_view"] = Basis(kv, basis);
   table.lights = {{0.0, 0.0}, {RadFromDeg(75.0), 0.0}};
   table.views = {{0.0, 0.0}, {RadFromDeg(70.0), 0.0}};
   for (int k = 0; k < table.num_coefficients; ++k) {
