@@ -23,7 +23,7 @@ class FileImages : public ImageSet {
     for (const size_t file : files_) {
       const FileEntry& entry = set_->files()[file];
       // OpenEXR seeks, so a compressed file is unpacked to memory first.
-      if (!entry.seekable && EndsWithIgnoringCase(entry.name, ".exr")) {
+      if (!entry.seekable && HasExrName(entry.name)) {
         open_bytes_ = std::max(open_bytes_, entry.size_bytes);
       }
     }
@@ -55,6 +55,10 @@ bool HasImageName(std::string_view name) {
   constexpr std::array<std::string_view, 4> kEndings = {".jpg", ".jpeg", ".png", ".exr"};
   return std::any_of(kEndings.begin(), kEndings.end(),
                      [&](std::string_view ending) { return EndsWithIgnoringCase(name, ending); });
+}
+
+bool HasExrName(std::string_view name) {
+  return EndsWithIgnoringCase(name, ".exr");
 }
 
 }  // namespace tessera

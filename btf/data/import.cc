@@ -57,7 +57,7 @@ std::optional<size_t> FindSingleExr(const FileSet& files) {
   for (size_t i = 0; i < files.files().size(); ++i) {
     const std::string& name = files.files()[i].name;
     if (HasImageName(name)) {
-      if (found || !name.ends_with(".exr")) {
+      if (found || !HasExrName(name)) {
         return std::nullopt;
       }
       found = i;

@@ -71,5 +71,6 @@ struct ImageList {
 
 // By the ending of the name, in any case: .jpg .jpeg .png .exr.
 [[nodiscard]] bool HasImageName(std::string_view name);
+[[nodiscard]] bool HasExrName(std::string_view name);
 
 }  // namespace tessera

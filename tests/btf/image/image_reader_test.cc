@@ -1,7 +1,9 @@
 #include "btf/image/image_reader.h"
 
 #include <algorithm>
+#include <array>
 #include <cstring>
+#include <limits>
 #include <string>
 #include <vector>
 
@@ -152,6 +154,25 @@ TEST(ImageReaderTest, OversizedAndEmptyImagesAreRefused) {
   EXPECT_TRUE(Open(MakePngHeader(16384, 16384, 3, 16)).ok());
   EXPECT_FALSE(Open("").ok());
   EXPECT_FALSE(Open("GIF89a............").ok());
+}
+
+TEST(ImageReaderTest, HostileExrWindowsAreRefused) {
+  const std::string good = *EncodeExr(Image(8, 8, 3));
+  const size_t window = good.find("dataWindow") + sizeof("dataWindow") + sizeof("box2i") + sizeof(int32_t);
+  const auto with_window = [&](std::array<int32_t, 4> corners) {  // x min, y min, x max, y max
+    std::string bytes = good;
+    std::memcpy(bytes.data() + window, corners.data(), sizeof(corners));
+    return ReadToEnd(bytes);
+  };
+  EXPECT_TRUE(with_window({0, 0, 7, 7}).ok());
+  constexpr int32_t kMax = std::numeric_limits<int32_t>::max();
+  for (const std::array<int32_t, 4>& corners :
+       {std::array{0, 0, 7, kMax - 1}, std::array{0, 0, kMax - 1, 7}, std::array{-kMax, -kMax, kMax, kMax},
+        std::array{0, 0, 7, 1 << 20}, std::array{0, 0, 7, 16384}, std::array{7, 7, 0, 0}}) {
+    const absl::Status status = with_window(corners);
+    EXPECT_FALSE(status.ok());
+    EXPECT_THAT(std::string(status.message()), HasSubstr("picture"));
+  }
 }
 
 TEST(ImageReaderTest, WholeImageFormatsStayWithinTheLimit) {
