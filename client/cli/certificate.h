@@ -8,8 +8,11 @@
 
 namespace tessera::cli {
 
-// One sentence per part of the certificate (borders, insides) whose seam ratio is above the limit that the
-// certificate states. Empty for a certificate that states none.
+// Seams whose ratio is above this are worth a look: along a cut, texels then differ half as much again as
+// neighbours in the material itself do (ratio 1: the cut cannot be told from the material).
+inline constexpr double kSeamRatioLimit = 1.5;
+
+// One sentence per part of the certificate (borders, insides) whose pooled ratio is above the limit.
 [[nodiscard]] std::vector<std::string> CertificateWarnings(const Json& certificate);
 
 }  // namespace tessera::cli

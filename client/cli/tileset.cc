@@ -119,7 +119,9 @@ absl::Status RunCertify(Session& session, const std::string& name) {
   TESSERA_ASSIGN_OR_RETURN(Client * client, session.Connect());
   TESSERA_ASSIGN_OR_RETURN(const v1::TileSet tile_set, client->GetTileSet(full_name, session.Context()));
   const Json certificate = Describe(tile_set)["certificate"];
-  session.Answer({{"name", ShortName(full_name)}, {"certificate", certificate}}, TextRecord(certificate));
+  session.Answer(
+      {{"name", ShortName(full_name)}, {"certificate", certificate}, {"ratio_limit", kSeamRatioLimit}},
+      fmt::format("{}\nratio limit: {}", TextRecord(certificate), kSeamRatioLimit));
   for (const std::string& warning : CertificateWarnings(certificate)) {
     session.Warn(fmt::format("{}: {}", ShortName(full_name), warning));
   }
