@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <new>
 #include <string>
 #include <utility>
 
@@ -26,7 +27,7 @@ constexpr int kMaxAreaSamples = 1024;
 constexpr int kMaxBounces = 16;
 constexpr double kMaxPolarDeg = 89.0;
 constexpr double kPolarSlackDeg = 1e-6;  // rounding of degrees to radians
-constexpr double kMaxBytes = 6.0 * (uint64_t{1} << 30U);
+constexpr double kMaxBytes = 8.0 * (uint64_t{1} << 30U);
 // Two cells per texel resolve what a texel averages; beyond this size one, so that tables stay within memory.
 constexpr int kLargestFineSize = 256;
 
@@ -131,15 +132,8 @@ std::string SourceOf(const GenerateParams& params) {
   return source;
 }
 
-}  // namespace
-
-std::vector<std::string_view> GeneratorKinds() {
-  return {"reactdiffuse", "holes", "wrinkles", "weave", kHeightmap};
-}
-
-absl::StatusOr<std::unique_ptr<BtfSource>> GenerateBtf(const GenerateParams& params,
-                                                       const RunContext& context) {
-  TESSERA_RETURN_IF_ERROR(Validate(params));
+// GenerateBtf of valid parameters.
+absl::StatusOr<std::unique_ptr<BtfSource>> Generate(const GenerateParams& params, const RunContext& context) {
   const MapParams map_params{.size = params.size,
                              .cells_per_texel = params.size <= kLargestFineSize ? 2 : 1,
                              .height_scale_texels = params.height_scale_texels,
@@ -176,6 +170,23 @@ absl::StatusOr<std::unique_ptr<BtfSource>> GenerateBtf(const GenerateParams& par
                              .bounces = params.bounces,
                              .seed = Mix64(params.seed, 0x6d65736fULL)};
   return TraceHeightField(std::move(maps), std::move(info), options, context);
+}
+
+}  // namespace
+
+std::vector<std::string_view> GeneratorKinds() {
+  return {"reactdiffuse", "holes", "wrinkles", "weave", kHeightmap};
+}
+
+absl::StatusOr<std::unique_ptr<BtfSource>> GenerateBtf(const GenerateParams& params,
+                                                       const RunContext& context) {
+  TESSERA_RETURN_IF_ERROR(Validate(params));
+  try {
+    return Generate(params, context);
+  } catch (const std::bad_alloc&) {
+    return absl::ResourceExhaustedError(
+        absl::StrCat("generating ", params.size, "x", params.size, ": out of memory"));
+  }
 }
 
 }  // namespace tessera

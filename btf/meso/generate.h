@@ -63,8 +63,11 @@ struct GenerateParams {
 // traces the view rays. Same parameters, same samples, for any number of threads and any blocking of rows.
 // Reports progress in "points" (GenerateBtf) and "rows" (ReadRows). Cost at 128x128x81x81: seconds on two
 // cores for both (tests/btf/meso prints it).
-// Errors: INVALID_ARGUMENT (kind, ranges, missing or unusable images), RESOURCE_EXHAUSTED (tables beyond
-// 6 GiB), CANCELLED, INTERNAL (Embree refuses).
+// Memory at 1024x1024 with 81 lights: 6.5 GiB; at 128x128: 360 MiB.
+// info().provenance.source is "generated:KIND", followed by ",key=value" for each of size, seed,
+// height-scale, area-samples and bounces that is not the default; licence CC0-1.0, but empty for "heightmap",
+// whose images keep theirs. Errors: INVALID_ARGUMENT (kind, ranges, missing or unusable images),
+// RESOURCE_EXHAUSTED (tables beyond 8 GiB), CANCELLED, INTERNAL (Embree refuses).
 [[nodiscard]] absl::StatusOr<std::unique_ptr<BtfSource>> GenerateBtf(const GenerateParams& params,
                                                                      const RunContext& context);
 

@@ -47,6 +47,51 @@ struct LightTables {
   std::vector<float> x, y, z;
 };
 
+// What one hit brings to every light.
+struct HitTerms {
+  std::array<float, 3> normal{};
+  std::array<float, 3> diffuse{};  // facet.diffuse (1 - E(n.wo))
+  float view_cosine = 1.0F;        // n.wo
+  float alpha_squared = 1.0F;
+  float smith_view = 1.0F;  // sqrt(a2 + (1 - a2) (n.wo)^2)
+  float f0 = 0.0F;
+  float lobe = 0.0F;  // a2 / 2, or 0 where there is no lobe
+};
+
+// Adds one hit to the sums of every light: the innermost loop, 1.7 billion turns at 128x128x81x81. A function
+// of its own with restricted parameters, because gcc vectorises it only so.
+[[gnu::noinline]] void AddLights(const HitTerms& hit, int stride, const uint8_t* __restrict visibility,
+                                 const float* __restrict direct, const float* __restrict indirect_r,
+                                 const float* __restrict indirect_g, const float* __restrict indirect_b,
+                                 const float* __restrict lx, const float* __restrict ly,
+                                 const float* __restrict lz, const float* __restrict hx,
+                                 const float* __restrict hy, const float* __restrict hz,
+                                 const float* __restrict schlick, float* __restrict sum_r,
+                                 float* __restrict sum_g, float* __restrict sum_b) {
+  const auto [nx, ny, nz] = hit.normal;
+  const auto [diffuse_r, diffuse_g, diffuse_b] = hit.diffuse;
+  const float a2 = hit.alpha_squared;
+  const float nv = hit.view_cosine;
+  const float smith_v = hit.smith_view;
+  const float f0 = hit.f0;
+  const float lobe = hit.lobe;
+  for (int l = 0; l < stride; ++l) {
+    const auto visible = static_cast<float>(visibility[l]);
+    const float cosine = nx * lx[l] + ny * ly[l] + nz * lz[l];
+    const float nl = cosine > 0.0F ? cosine : 0.0F;
+    const float nh = nx * hx[l] + ny * hy[l] + nz * hz[l];
+    // pi f_s n.l = F (a2 / d^2) n.l / (2 g): D = a2 / (pi d^2), G2 / (4 n.l n.v) = 1 / (2 g).
+    const float d = nh * nh * (a2 - 1.0F) + 1.0F;
+    const float g = nl * smith_v + nv * std::sqrt(a2 + (1.0F - a2) * nl * nl);
+    const float fresnel = f0 + (1.0F - f0) * schlick[l];
+    const float specular = visible * lobe * fresnel * nl / (d * d * g);
+    const float received = visible * direct[l];
+    sum_r[l] += diffuse_r * (received + indirect_r[l]) + specular;
+    sum_g[l] += diffuse_g * (received + indirect_g[l]) + specular;
+    sum_b[l] += diffuse_b * (received + indirect_b[l]) + specular;
+  }
+}
+
 class HeightFieldTracer final : public BtfSource {
  public:
   HeightFieldTracer(SurfaceMaps maps, BtfInfo info, const TraceOptions& options,
@@ -182,49 +227,22 @@ void HeightFieldTracer::TraceTexel(int x, int row, std::span<float> sums, float*
 void HeightFieldTracer::AddHit(int64_t facet_index, int part, const ViewTables& tables, float* sums) const {
   const Facet& facet = facets_[facet_index];
   const int stride = light_.stride();
-  const float nx = facet.normal.x();
-  const float ny = facet.normal.y();
-  const float nz = facet.normal.z();
   const float nv = std::max(kMinViewCosine, facet.normal.dot(tables.direction.cast<float>().eval()));
   const float left_over = 1.0F - specular_.Directional(nv, facet.roughness, maps_.specular_f0);
-  const float diffuse_r = facet.diffuse[0] * left_over;
-  const float diffuse_g = facet.diffuse[1] * left_over;
-  const float diffuse_b = facet.diffuse[2] * left_over;
   const float a2 = facet.alpha_squared;
-  const float smith_v = std::sqrt(a2 + (1.0F - a2) * nv * nv);
-  const float f0 = maps_.specular_f0;
-  const float lobe = f0 > 0.0F ? 0.5F * a2 : 0.0F;
-
-  const uint8_t* __restrict visibility = light_.Visibility(facet_index, part);
-  const float* __restrict direct = light_.Direct(facet_index);
-  const float* __restrict indirect_r = light_.Indirect(facet_index);
-  const float* __restrict indirect_g = indirect_r + stride;
-  const float* __restrict indirect_b = indirect_g + stride;
-  const float* __restrict lx = lights_.x.data();
-  const float* __restrict ly = lights_.y.data();
-  const float* __restrict lz = lights_.z.data();
-  const float* __restrict hx = tables.half_x.data();
-  const float* __restrict hy = tables.half_y.data();
-  const float* __restrict hz = tables.half_z.data();
-  const float* __restrict schlick = tables.schlick.data();
-  float* __restrict sum_r = sums;
-  float* __restrict sum_g = sums + stride;
-  float* __restrict sum_b = sums + 2 * static_cast<size_t>(stride);
-  for (int l = 0; l < stride; ++l) {
-    const auto visible = static_cast<float>(visibility[l]);
-    const float cosine = nx * lx[l] + ny * ly[l] + nz * lz[l];
-    const float nl = cosine > 0.0F ? cosine : 0.0F;
-    const float nh = nx * hx[l] + ny * hy[l] + nz * hz[l];
-    // pi f_s n.l = F (a2 / d^2) n.l / (2 g): D = a2 / (pi d^2), G2 / (4 n.l n.v) = 1 / (2 g).
-    const float d = nh * nh * (a2 - 1.0F) + 1.0F;
-    const float g = nl * smith_v + nv * std::sqrt(a2 + (1.0F - a2) * nl * nl);
-    const float fresnel = f0 + (1.0F - f0) * schlick[l];
-    const float specular = visible * lobe * fresnel * nl / (d * d * g);
-    const float received = visible * direct[l];
-    sum_r[l] += diffuse_r * (received + indirect_r[l]) + specular;
-    sum_g[l] += diffuse_g * (received + indirect_g[l]) + specular;
-    sum_b[l] += diffuse_b * (received + indirect_b[l]) + specular;
-  }
+  const HitTerms hit{
+      .normal = {facet.normal.x(), facet.normal.y(), facet.normal.z()},
+      .diffuse = {facet.diffuse[0] * left_over, facet.diffuse[1] * left_over, facet.diffuse[2] * left_over},
+      .view_cosine = nv,
+      .alpha_squared = a2,
+      .smith_view = std::sqrt(a2 + (1.0F - a2) * nv * nv),
+      .f0 = maps_.specular_f0,
+      .lobe = maps_.specular_f0 > 0.0F ? 0.5F * a2 : 0.0F};
+  const float* indirect = light_.Indirect(facet_index);
+  AddLights(hit, stride, light_.Visibility(facet_index, part), light_.Direct(facet_index), indirect,
+            indirect + stride, indirect + 2 * static_cast<size_t>(stride), lights_.x.data(), lights_.y.data(),
+            lights_.z.data(), tables.half_x.data(), tables.half_y.data(), tables.half_z.data(),
+            tables.schlick.data(), sums, sums + stride, sums + 2 * static_cast<size_t>(stride));
 }
 
 }  // namespace

@@ -222,7 +222,7 @@ TEST(GenerateTest, RefusesWhatWouldNotFitInMemoryBeforeItStarts) {
   }
   const auto source = GenerateBtf(params, {});
   EXPECT_EQ(source.status().code(), absl::StatusCode::kResourceExhausted);
-  EXPECT_THAT(std::string(source.status().message()), HasSubstr("limit 6144 MiB"));
+  EXPECT_THAT(std::string(source.status().message()), HasSubstr("limit 8192 MiB"));
 }
 
 }  // namespace
