@@ -37,6 +37,14 @@ std::string_view ReasonOfCode(absl::StatusCode code) {
       return "CANCELLED";
     case absl::StatusCode::kDataLoss:
       return "BLOB_CORRUPT";
+    case absl::StatusCode::kFailedPrecondition:
+      return "PRECONDITION_FAILED";
+    case absl::StatusCode::kResourceExhausted:
+      return "LIMIT_REACHED";
+    case absl::StatusCode::kUnimplemented:
+      return "UNSUPPORTED";
+    case absl::StatusCode::kAborted:
+      return "ABORTED";
     case absl::StatusCode::kUnavailable:
       return "UNAVAILABLE";
     case absl::StatusCode::kDeadlineExceeded:

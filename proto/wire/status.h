@@ -20,9 +20,10 @@ namespace tessera {
 [[nodiscard]] absl::Status WithReason(absl::Status status, std::string_view reason,
                                       std::string_view subject = {});
 
-// The reason that `status` carries, or the one that its code stands for (INVALID_ARGUMENT: ARGUMENT_INVALID,
-// NOT_FOUND: NOT_FOUND, ALREADY_EXISTS: NAME_TAKEN, CANCELLED: CANCELLED, DATA_LOSS: BLOB_CORRUPT,
-// UNAVAILABLE: UNAVAILABLE, DEADLINE_EXCEEDED: DEADLINE_EXCEEDED, others: INTERNAL). Empty for OK.
+// The reason that `status` carries, or the one that its code stands for (INVALID_ARGUMENT and OUT_OF_RANGE:
+// ARGUMENT_INVALID, ALREADY_EXISTS: NAME_TAKEN, DATA_LOSS: BLOB_CORRUPT, FAILED_PRECONDITION:
+// PRECONDITION_FAILED, RESOURCE_EXHAUSTED: LIMIT_REACHED, UNIMPLEMENTED: UNSUPPORTED; NOT_FOUND, CANCELLED,
+// ABORTED, UNAVAILABLE and DEADLINE_EXCEEDED: themselves; others: INTERNAL). Empty for OK.
 [[nodiscard]] std::string ReasonOf(const absl::Status& status);
 // The subject that `status` carries; empty when none.
 [[nodiscard]] std::string SubjectOf(const absl::Status& status);
