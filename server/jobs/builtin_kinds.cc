@@ -1,0 +1,17 @@
+#include "server/jobs/builtin_kinds.h"
+
+#include "server/jobs/generate_job.h"
+#include "server/jobs/import_job.h"
+#include "server/jobs/synthesize_job.h"
+
+namespace tessera {
+
+std::vector<JobKind> BuiltinJobKinds() {
+  return {
+      {"import", 1, &RunImportJob},
+      {"generate", 1, &RunGenerateJob},
+      {"synthesize", 1, &RunSynthesizeJob},
+  };
+}
+
+}  // namespace tessera

@@ -1,0 +1,121 @@
+#include "server/jobs/generate_job.h"
+
+#include <algorithm>
+#include <memory>
+#include <optional>
+#include <span>
+
+#include <absl/strings/str_cat.h>
+
+#include "btf/base/status_macros.h"
+#include "btf/data/direction_sets.h"
+#include "btf/image/image_io.h"
+#include "btf/meso/generate.h"
+#include "proto/wire/convert.h"
+#include "proto/wire/names.h"
+#include "proto/wire/status.h"
+#include "server/jobs/encode.h"
+
+namespace tessera {
+namespace {
+
+constexpr uint64_t kMaxImageBytes = uint64_t{256} << 20;
+constexpr uint32_t kMaxSize = 1 << 14;  // keeps the cast exact; the generator knows the real limit
+
+absl::StatusOr<GenerateParams> ParamsFromRequest(const v1::GenerateMaterialRequest& request) {
+  GenerateParams params;
+  params.kind = request.kind();
+  if (request.size() > kMaxSize) {
+    return absl::InvalidArgumentError(absl::StrCat("size ", request.size(), ", at most ", kMaxSize));
+  }
+  params.size = static_cast<int>(request.size());
+  params.seed = request.seed();
+  params.height_scale_texels = request.height_scale();
+  TESSERA_ASSIGN_OR_RETURN(params.lights, DirectionSet(request.lights()));
+  TESSERA_ASSIGN_OR_RETURN(params.views, DirectionSet(request.views()));
+  return params;
+}
+
+}  // namespace
+
+void FillDefaults(v1::GenerateMaterialRequest& request) {
+  if (request.size() == 0) {
+    request.set_size(128);
+  }
+  if (request.lights().empty()) {
+    request.set_lights("ubo81");
+  }
+  if (request.views().empty()) {
+    request.set_views("ubo81");
+  }
+  FillDefaults(*request.mutable_encode());
+}
+
+std::vector<std::string> GenerateInputs(const v1::GenerateMaterialRequest& request) {
+  std::vector<std::string> inputs;
+  for (const std::string& sha256 :
+       {request.height_sha256(), request.colour_sha256(), request.roughness_sha256()}) {
+    if (!sha256.empty()) {
+      inputs.push_back(sha256);
+    }
+  }
+  return inputs;
+}
+
+absl::Status CheckGenerateRequest(const v1::GenerateMaterialRequest& request) {
+  const std::vector<std::string_view> kinds = GeneratorKinds();
+  if (std::find(kinds.begin(), kinds.end(), request.kind()) == kinds.end()) {
+    std::string known;
+    for (const std::string_view kind : kinds) {
+      known.append(known.empty() ? "" : ", ").append(kind);
+    }
+    return WithReason(
+        absl::InvalidArgumentError(absl::StrCat("unknown kind \"", request.kind(), "\", known: ", known)),
+        "ARGUMENT_INVALID", "kind");
+  }
+  const bool from_images = request.kind() == "heightmap";
+  if (from_images && (request.height_sha256().empty() || request.colour_sha256().empty())) {
+    return WithReason(absl::InvalidArgumentError("kind heightmap needs height_sha256 and colour_sha256"),
+                      "ARGUMENT_INVALID", "height_sha256");
+  }
+  if (!from_images && !GenerateInputs(request).empty()) {
+    return WithReason(absl::InvalidArgumentError(absl::StrCat("kind ", request.kind(), " takes no images")),
+                      "ARGUMENT_INVALID", "height_sha256");
+  }
+  for (const std::string& sha256 : GenerateInputs(request)) {
+    TESSERA_RETURN_IF_ERROR(CheckDigest(sha256, "height_sha256, colour_sha256 or roughness_sha256"));
+  }
+  v1::GenerateMaterialRequest filled = request;
+  FillDefaults(filled);
+  TESSERA_RETURN_IF_ERROR(ParamsFromRequest(filled).status());
+  return CheckEncodeOptions(filled.encode());
+}
+
+absl::StatusOr<JobOutput> RunGenerateJob(const JobInput& input, const JobContext& context) {
+  v1::GenerateMaterialRequest request;
+  if (!request.ParseFromString(input.params)) {
+    return absl::InternalError("a generate job takes a GenerateMaterialRequest");
+  }
+  FillDefaults(request);
+  TESSERA_ASSIGN_OR_RETURN(GenerateParams params, ParamsFromRequest(request));
+  const auto read_image = [&](const std::string& sha256, std::string_view name,
+                              const std::optional<Transfer>& transfer,
+                              std::optional<Image>& image) -> absl::Status {
+    if (sha256.empty()) {
+      return absl::OkStatus();
+    }
+    TESSERA_ASSIGN_OR_RETURN(const std::string bytes, context.blobs->ReadAll(sha256, kMaxImageBytes));
+    TESSERA_ASSIGN_OR_RETURN(image, DecodeImage(std::as_bytes(std::span(bytes)), name, transfer));
+    return absl::OkStatus();
+  };
+  // Height and roughness are measures, not colours: their codes are taken as they are.
+  TESSERA_RETURN_IF_ERROR(read_image(request.height_sha256(), "height", Transfer::Linear(), params.height));
+  TESSERA_RETURN_IF_ERROR(read_image(request.colour_sha256(), "colour", std::nullopt, params.colour));
+  TESSERA_RETURN_IF_ERROR(
+      read_image(request.roughness_sha256(), "roughness", Transfer::Linear(), params.roughness));
+  TESSERA_ASSIGN_OR_RETURN(const std::unique_ptr<BtfSource> source, GenerateBtf(params, context.run));
+  TESSERA_ASSIGN_OR_RETURN(const Material material, EncodeSource(*source, request.encode(), context.run));
+  return OutputOfMaterial(material);
+}
+
+}  // namespace tessera

@@ -1,0 +1,82 @@
+#include "server/jobs/synthesize_job.h"
+
+#include <span>
+
+#include <absl/strings/str_cat.h>
+
+#include "btf/base/status_macros.h"
+#include "btf/codec/material.h"
+#include "btf/tiles/synthesize.h"
+#include "btf/wang/arrangement.h"
+#include "btf/wang/tile_set.h"
+#include "proto/wire/convert.h"
+#include "proto/wire/names.h"
+#include "proto/wire/status.h"
+
+namespace tessera {
+namespace {
+
+constexpr uint64_t kMaxMaterialBytes = uint64_t{4} << 30;
+constexpr uint32_t kMaxTileSize = 1024;
+constexpr uint32_t kMinStripHeight = 8;
+
+}  // namespace
+
+void FillDefaults(v1::SynthesizeTileSetRequest& request) {
+  const SynthesisParams defaults;
+  if (request.tile_size() == 0) {
+    request.set_tile_size(defaults.tile_size);
+  }
+  if (request.strip_height() == 0) {
+    request.set_strip_height(defaults.strip_height);
+  }
+  if (request.method().empty()) {
+    request.set_method("frame");
+  }
+}
+
+absl::Status CheckSynthesizeRequest(const v1::SynthesizeTileSetRequest& request) {
+  v1::SynthesizeTileSetRequest filled = request;
+  FillDefaults(filled);
+  const auto refuse = [](const std::string& message, std::string_view field) {
+    return WithReason(absl::InvalidArgumentError(message), "ARGUMENT_INVALID", field);
+  };
+  if (filled.method() != "frame") {
+    return refuse(absl::StrCat("unknown method \"", filled.method(), "\", known: frame"), "method");
+  }
+  if (filled.strip_height() < kMinStripHeight || filled.strip_height() % 2 != 0) {
+    return refuse(absl::StrCat("strip_height ", filled.strip_height(),
+                               ", expected an even number of at least ", kMinStripHeight),
+                  "strip_height");
+  }
+  if (filled.tile_size() > kMaxTileSize || filled.tile_size() < 2 * uint64_t{filled.strip_height()}) {
+    return refuse(absl::StrCat("tile_size ", filled.tile_size(), ", expected twice the strip height (",
+                               2 * uint64_t{filled.strip_height()}, ") to ", kMaxTileSize),
+                  "tile_size");
+  }
+  return absl::OkStatus();
+}
+
+absl::StatusOr<JobOutput> RunSynthesizeJob(const JobInput& input, const JobContext& context) {
+  v1::SynthesizeTileSetRequest request;
+  if (!request.ParseFromString(input.params) || input.inputs.size() != 1) {
+    return absl::InternalError("a synthesize job takes a SynthesizeTileSetRequest and one blob");
+  }
+  FillDefaults(request);
+  TESSERA_ASSIGN_OR_RETURN(const std::string arrangement_id, ParseArrangementName(request.name()));
+  TESSERA_ASSIGN_OR_RETURN(const Arrangement* arrangement, FindArrangement(arrangement_id));
+  TESSERA_ASSIGN_OR_RETURN(std::string bytes, context.blobs->ReadAll(input.inputs[0], kMaxMaterialBytes));
+  TESSERA_ASSIGN_OR_RETURN(const Material material, ParseMaterial(std::as_bytes(std::span(bytes))));
+  std::string().swap(bytes);
+  SynthesisParams params;
+  params.tile_size = static_cast<int>(request.tile_size());
+  params.strip_height = static_cast<int>(request.strip_height());
+  params.seed = request.seed();
+  params.force = request.force();
+  TESSERA_ASSIGN_OR_RETURN(const TileSet tile_set,
+                           SynthesizeTileSet(material, *arrangement, params, context.run));
+  TESSERA_ASSIGN_OR_RETURN(std::string container, SerializeTileSet(tile_set));
+  return JobOutput{std::move(container), MessageFromTileSet(tile_set)};
+}
+
+}  // namespace tessera

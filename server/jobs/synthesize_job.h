@@ -1,0 +1,23 @@
+// Job kind "synthesize": a material becomes a tile set in an arrangement.
+//
+// Parameters: SynthesizeTileSetRequest of which name is "arrangements/A" and material, replace and request_id
+// are empty. Inputs: the material's container.
+#pragma once
+
+#include <absl/status/status.h>
+#include <absl/status/statusor.h>
+
+#include "server/jobs/job.h"
+#include "tessera/v1/tessera.pb.h"
+
+namespace tessera {
+
+// What can be refused before the job is queued. Errors: INVALID_ARGUMENT naming the field and its legal
+// values.
+[[nodiscard]] absl::Status CheckSynthesizeRequest(const v1::SynthesizeTileSetRequest& request);
+// Defaults for what is 0 or empty, so that equal requests become equal bytes.
+void FillDefaults(v1::SynthesizeTileSetRequest& request);
+// Errors: ParseMaterial's and SynthesizeTileSet's.
+[[nodiscard]] absl::StatusOr<JobOutput> RunSynthesizeJob(const JobInput& input, const JobContext& context);
+
+}  // namespace tessera
