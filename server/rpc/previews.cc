@@ -1,0 +1,138 @@
+#include "server/rpc/previews.h"
+
+#include <algorithm>
+#include <chrono>
+#include <span>
+
+#include <absl/strings/str_cat.h>
+
+#include "btf/base/status_macros.h"
+#include "btf/image/image_io.h"
+#include "btf/render/preview.h"
+#include "btf/wang/shapes.h"
+#include "btf/wang/tile_set.h"
+#include "proto/wire/convert.h"
+#include "proto/wire/names.h"
+#include "proto/wire/status.h"
+#include "server/rpc/dressings.h"
+#include "server/rpc/formats.h"
+
+namespace tessera {
+namespace {
+
+constexpr std::chrono::milliseconds kContextPoll{20};
+
+absl::Status Refuse(const std::string& message, std::string_view field) {
+  return WithReason(absl::InvalidArgumentError(message), "ARGUMENT_INVALID", field);
+}
+
+absl::StatusOr<int> SideOf(uint32_t requested, uint32_t usual, std::string_view field) {
+  const uint32_t side = requested == 0 ? usual : requested;
+  if (side < kMinPreviewSide || side > kMaxPreviewSide) {
+    return Refuse(
+        absl::StrCat(std::string(field), " ", side, ", expected ", kMinPreviewSide, " to ", kMaxPreviewSide),
+        field);
+  }
+  return static_cast<int>(side);
+}
+
+}  // namespace
+
+absl::StatusOr<Dressing> PreviewsService::SurfaceOf(const v1::RenderPreviewRequest& request,
+                                                    const std::string& arrangement,
+                                                    const RunContext& context) const {
+  // A picture shows breaks rather than refusing them.
+  const DressParams params{.seed = request.seed(), .allow_breaks = true};
+  switch (request.surface_case()) {
+    case v1::RenderPreviewRequest::kDressingSha256: {
+      TESSERA_RETURN_IF_ERROR(CheckDigest(request.dressing_sha256(), "dressing_sha256"));
+      TESSERA_ASSIGN_OR_RETURN(const std::string bytes,
+                               backend_.blobs.ReadAll(request.dressing_sha256(), kMaxDressingBytes));
+      absl::StatusOr<Dressing> dressing = ParseDressing(std::as_bytes(std::span(bytes)));
+      if (!dressing.ok()) {
+        return FormatInvalid(dressing.status(), request.dressing_sha256());
+      }
+      return dressing;
+    }
+    case v1::RenderPreviewRequest::kBuiltin: {
+      TESSERA_ASSIGN_OR_RETURN(const QuadMesh mesh, BuiltinShape(request.builtin()));
+      TESSERA_ASSIGN_OR_RETURN(DressResult result, DressSurface(mesh, arrangement, params, context));
+      return std::move(result.dressing);
+    }
+    case v1::RenderPreviewRequest::kMeshSha256: {
+      TESSERA_ASSIGN_OR_RETURN(const QuadMesh mesh, ReadUploadedMesh(backend_, request.mesh_sha256()));
+      TESSERA_ASSIGN_OR_RETURN(DressResult result, DressSurface(mesh, arrangement, params, context));
+      return std::move(result.dressing);
+    }
+    case v1::RenderPreviewRequest::SURFACE_NOT_SET:
+      break;
+  }
+  return Refuse("a surface is needed: dressing_sha256, builtin or mesh_sha256", "surface");
+}
+
+absl::StatusOr<std::string> PreviewsService::Render(const v1::RenderPreviewRequest& request,
+                                                    const RunContext& context) {
+  TESSERA_ASSIGN_OR_RETURN(const TileSetId id, ParseTileSetName(request.tile_set()));
+  PreviewScene scene;
+  TESSERA_ASSIGN_OR_RETURN(scene.width, SideOf(request.width(), 640, "width"));
+  TESSERA_ASSIGN_OR_RETURN(scene.height, SideOf(request.height(), 480, "height"));
+  if (request.lights_size() > kMaxPreviewLights) {
+    return Refuse(absl::StrCat(request.lights_size(), " lights, at most ", kMaxPreviewLights), "lights");
+  }
+  if (request.lights_size() > 0) {
+    scene.lights.clear();
+    std::transform(request.lights().begin(), request.lights().end(), std::back_inserter(scene.lights),
+                   LightFromMessage);
+  }
+  v1::TileSet entry;
+  TESSERA_RETURN_IF_ERROR(backend_.connections.Read([&](Database& db) -> absl::Status {
+    TESSERA_ASSIGN_OR_RETURN(entry, tessera::GetTileSet(db, id));
+    return absl::OkStatus();
+  }));
+  TESSERA_ASSIGN_OR_RETURN(const Dressing dressing, SurfaceOf(request, id.arrangement, context));
+  if (dressing.arrangement_id != id.arrangement ||
+      dressing.arrangement_sha256 != entry.arrangement_sha256()) {
+    return WithReason(absl::FailedPreconditionError(absl::StrCat(
+                          "the dressing is for ", dressing.arrangement_id, " (", dressing.arrangement_sha256,
+                          "), the tile set of ", id.arrangement, " (", entry.arrangement_sha256(), ")")),
+                      "ARRANGEMENT_MISMATCH", request.tile_set());
+  }
+  TESSERA_ASSIGN_OR_RETURN(const std::string bytes,
+                           backend_.blobs.ReadAll(entry.blob().sha256(), kMaxContainerBytes));
+  TESSERA_ASSIGN_OR_RETURN(const TileSet tile_set, ParseTileSet(std::as_bytes(std::span(bytes))));
+  scene.dressing = &dressing;
+  scene.tile_set = &tile_set;
+  scene.camera = request.has_camera() ? CameraFromMessage(request.camera())
+                                      : FramingCamera(dressing.mesh, scene.width, scene.height);
+
+  std::unique_lock lock(context_mutex_, std::defer_lock);
+  while (!lock.try_lock_for(kContextPoll)) {
+    TESSERA_RETURN_IF_ERROR(context.CheckStop());
+  }
+  if (context_ == nullptr) {
+    TESSERA_ASSIGN_OR_RETURN(context_, CreateOsmesaContext());
+  }
+  TESSERA_ASSIGN_OR_RETURN(const Image image, RenderGl(*context_, scene, context));
+  lock.unlock();
+  return request.format() == v1::RenderPreviewRequest::EXR ? EncodeExr(image) : EncodePng(image);
+}
+
+absl::Status PreviewsService::RenderPreview(const v1::RenderPreviewRequest& request,
+                                            const IsCancelled& is_cancelled,
+                                            const std::function<bool(const v1::DataChunk&)>& write) {
+  std::string picture;
+  TESSERA_RETURN_IF_ERROR(RunForCaller(is_cancelled, [&](const RunContext& context) -> absl::Status {
+    TESSERA_ASSIGN_OR_RETURN(picture, Render(request, context));
+    return absl::OkStatus();
+  }));
+  v1::DataChunk chunk;
+  for (size_t offset = 0; offset < picture.size(); offset += kChunkBytes) {
+    chunk.set_data(picture.substr(offset, kChunkBytes));
+    if (!write(chunk)) {
+      return absl::CancelledError("the caller went away");
+    }
+  }
+  return absl::OkStatus();
+}
+
+}  // namespace tessera

@@ -1,0 +1,123 @@
+#include "server/rpc/tile_sets.h"
+
+#include <span>
+
+#include <absl/strings/str_cat.h>
+
+#include "btf/base/status_macros.h"
+#include "btf/wang/arrangement.h"
+#include "btf/wang/tile_set.h"
+#include "proto/wire/convert.h"
+#include "proto/wire/names.h"
+#include "proto/wire/status.h"
+#include "server/jobs/synthesize_job.h"
+#include "server/rpc/formats.h"
+
+namespace tessera {
+
+absl::StatusOr<v1::Job> TileSetsService::SynthesizeTileSet(
+    const v1::SynthesizeTileSetRequest& request) const {
+  TESSERA_ASSIGN_OR_RETURN(const std::string material, ParseMaterialName(request.material()));
+  const bool takes_material_name = request.name().ends_with('/');
+  TESSERA_ASSIGN_OR_RETURN(
+      const TileSetId id, ParseTileSetName(takes_material_name ? request.name() + material : request.name()));
+  TESSERA_RETURN_IF_ERROR(FindArrangement(id.arrangement).status());
+  TESSERA_RETURN_IF_ERROR(CheckSynthesizeRequest(request));
+  v1::Job earlier;
+  TESSERA_ASSIGN_OR_RETURN(const bool answered, FindEarlierAnswer(backend_, "SynthesizeTileSet",
+                                                                  request.request_id(), request, earlier));
+  if (answered) {
+    return earlier;  // the material may be gone by now
+  }
+  std::string material_sha256;
+  TESSERA_RETURN_IF_ERROR(backend_.connections.Read([&](Database& db) -> absl::Status {
+    TESSERA_ASSIGN_OR_RETURN(const v1::Material message, tessera::GetMaterial(db, material));
+    material_sha256 = message.blob().sha256();
+    return absl::OkStatus();
+  }));
+  v1::SynthesizeTileSetRequest params = request;
+  params.set_name(ArrangementName(id.arrangement));
+  params.clear_material();
+  params.clear_replace();
+  params.clear_request_id();
+  FillDefaults(params);
+  TESSERA_ASSIGN_OR_RETURN(const int version, backend_.pool.KindVersion("synthesize"));
+  return QueueJob(backend_, "SynthesizeTileSet", request.request_id(), request,
+                  {"synthesize",
+                   version,
+                   params.SerializeAsString(),
+                   {material_sha256},
+                   TileSetName(id),
+                   request.replace() ? OnTaken::kReplace : OnTaken::kRefuse});
+}
+
+absl::StatusOr<v1::TileSet> TileSetsService::CreateTileSet(const v1::CreateTileSetRequest& request) const {
+  TESSERA_ASSIGN_OR_RETURN(const TileSetId id, ParseTileSetName(request.name()));
+  TESSERA_RETURN_IF_ERROR(CheckDigest(request.blob_sha256(), "blob_sha256"));
+  v1::TileSet response;
+  TESSERA_ASSIGN_OR_RETURN(const bool answered, FindEarlierAnswer(backend_, "CreateTileSet",
+                                                                  request.request_id(), request, response));
+  if (answered) {
+    return response;
+  }
+  TESSERA_ASSIGN_OR_RETURN(const std::string bytes,
+                           backend_.blobs.ReadAll(request.blob_sha256(), kMaxContainerBytes));
+  const absl::StatusOr<TileSet> tile_set = ParseTileSet(std::as_bytes(std::span(bytes)));
+  if (!tile_set.ok()) {
+    return FormatInvalid(tile_set.status(), request.blob_sha256());
+  }
+  TESSERA_ASSIGN_OR_RETURN(const Arrangement* arrangement, FindArrangement(id.arrangement));
+  if (tile_set->arrangement_id != arrangement->id || tile_set->arrangement_sha256 != arrangement->sha256) {
+    return WithReason(absl::InvalidArgumentError(absl::StrCat(
+                          "the tile set is of ", tile_set->arrangement_id, " (", tile_set->arrangement_sha256,
+                          "), the name says ", arrangement->id, " (", arrangement->sha256, ")")),
+                      "ARRANGEMENT_MISMATCH", request.name());
+  }
+  const v1::TileSet description = MessageFromTileSet(*tile_set);
+  TESSERA_RETURN_IF_ERROR(Mutate(
+      backend_, "CreateTileSet", request.request_id(), request, response, [&](Database& db) -> absl::Status {
+        TESSERA_ASSIGN_OR_RETURN(
+            response, PutTileSet(db, id, request.blob_sha256(), description,
+                                 request.replace() ? OnTaken::kReplace : OnTaken::kRefuse, backend_.clock()));
+        return absl::OkStatus();
+      }));
+  return response;
+}
+
+absl::StatusOr<v1::TileSet> TileSetsService::GetTileSet(const v1::GetTileSetRequest& request) const {
+  TESSERA_ASSIGN_OR_RETURN(const TileSetId id, ParseTileSetName(request.name()));
+  v1::TileSet response;
+  TESSERA_RETURN_IF_ERROR(backend_.connections.Read([&](Database& db) -> absl::Status {
+    TESSERA_ASSIGN_OR_RETURN(response, tessera::GetTileSet(db, id));
+    return absl::OkStatus();
+  }));
+  return response;
+}
+
+absl::StatusOr<v1::ListTileSetsResponse> TileSetsService::ListTileSets(
+    const v1::ListTileSetsRequest& request) const {
+  std::string arrangement;
+  if (!request.parent().empty()) {
+    TESSERA_ASSIGN_OR_RETURN(arrangement, ParseArrangementName(request.parent()));
+  }
+  TESSERA_ASSIGN_OR_RETURN(const Page page,
+                           ParsePage(TileSetList(arrangement), request.page_size(), request.page_token()));
+  v1::ListTileSetsResponse response;
+  TESSERA_RETURN_IF_ERROR(backend_.connections.Read([&](Database& db) -> absl::Status {
+    TESSERA_ASSIGN_OR_RETURN(response, tessera::ListTileSets(db, arrangement, page));
+    return absl::OkStatus();
+  }));
+  return response;
+}
+
+absl::StatusOr<v1::DeleteTileSetResponse> TileSetsService::DeleteTileSet(
+    const v1::DeleteTileSetRequest& request) const {
+  TESSERA_ASSIGN_OR_RETURN(const TileSetId id, ParseTileSetName(request.name()));
+  v1::DeleteTileSetResponse response;
+  TESSERA_RETURN_IF_ERROR(
+      Mutate(backend_, "DeleteTileSet", request.request_id(), request, response,
+             [&](Database& db) { return tessera::DeleteTileSet(db, id, backend_.clock()); }));
+  return response;
+}
+
+}  // namespace tessera
