@@ -3,8 +3,13 @@
 #include "btf/render/reference.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
+#include <memory>
+#include <span>
+#include <utility>
+#include <vector>
 
 #include <Eigen/Geometry>
 

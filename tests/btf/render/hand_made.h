@@ -2,8 +2,10 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "btf/base/rng.h"
@@ -140,10 +142,14 @@ inline QuadMesh SkewedGrid(int n, double skew, uint64_t seed) {
   return mesh;
 }
 
+// Above what single precision does to a value of about 1.
+inline constexpr double kVisibleDifference = 1e-3;
+
 struct Comparison {
   double rmse = 0.0;
   double worst = 0.0;
-  size_t pixels = 0;  // compared
+  double differing = 0.0;  // share of pixels with a component off by more than kVisibleDifference
+  size_t pixels = 0;       // compared
 };
 
 // Over pixels whose neighbourhood of 3 x 3 is wholly covered without a jump in depth.
@@ -167,13 +173,17 @@ inline Comparison CompareAwayFromSilhouettes(const Image& image, const Reference
         continue;
       }
       ++result.pixels;
+      double largest = 0.0;
       for (int c = 0; c < 3; ++c) {
         const double difference = image.at(x, y)[c] - reference.image.at(x, y)[c];
         squares += difference * difference / 3.0;
-        result.worst = std::max(result.worst, std::abs(difference));
+        largest = std::max(largest, std::abs(difference));
       }
+      result.worst = std::max(result.worst, largest);
+      result.differing += largest > kVisibleDifference ? 1.0 : 0.0;
     }
   }
+  result.differing /= static_cast<double>(std::max<size_t>(result.pixels, 1));
   result.rmse = std::sqrt(squares / static_cast<double>(std::max<size_t>(result.pixels, 1)));
   return result;
 }
