@@ -1,0 +1,353 @@
+#include "btf/tiles/corners.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdlib>
+#include <limits>
+
+#include "btf/base/parallel.h"
+#include "btf/base/rng.h"
+#include "btf/base/status_macros.h"
+
+namespace tessera {
+namespace {
+
+constexpr int kStarts = 6;       // random starts
+constexpr int kSweeps = 4;       // over all samples; the last is greedy
+constexpr int kCandidates = 80;  // cut for each sample and sweep
+// What a set of samples costs: the mean mismatch of its cuts in mean steps, plus these prices. A sample wholly inside
+// another one, on average over the samples:
+constexpr double kOverlapPrice = 1.0;
+// A sample that stands out: the squared distance of its mean from the exemplar's, against that of a sample drawn at
+// random, and the absolute logarithm of its variance against the same. Every vertex of a dressed mesh shows corner
+// samples, so one that is bland or striking would draw the grid.
+constexpr double kMeanPrice = 0.1;
+constexpr double kVariancePrice = 0.3;
+constexpr double kTemperature = 0.02;  // of the draw, in mean steps
+constexpr int kTypicalDraws = 256;     // random samples that tell what is typical
+
+// Where in a sample a corner texel lies.
+struct SampleTexel {
+  int sample = 0;
+  int x = 0;
+  int y = 0;
+  int turns = 0;
+};
+
+SampleTexel OutTexel(const CornerPair& pair, int i, int j, int strip_height) {
+  const StripTexel texel = StripTexelAt(0, pair.out.sign, i, j, strip_height, strip_height);
+  const int half = strip_height / 2;
+  return {2 * pair.out.strip + texel.x / half, texel.x % half, texel.y, texel.turns};
+}
+
+SampleTexel InTexel(const CornerPair& pair, int i, int j, int strip_height) {
+  const StripTexel texel = StripTexelAt(3, pair.in.sign, strip_height - 1 - j, i, strip_height, strip_height);
+  const int half = strip_height / 2;
+  return {2 * pair.in.strip + texel.x / half, texel.x % half, texel.y, texel.turns};
+}
+
+uint32_t TexelOf(const Exemplar& exemplar, const std::vector<Patch>& samples, const SampleTexel& at) {
+  const Patch& patch = samples[at.sample];
+  return TurnTexel(exemplar.TexelAt(patch.turn, patch.u + at.x, patch.v + at.y), at.turns);
+}
+
+// Cuts one pair. The square is laid out as a picture: column i, row h/2 - 1 - j.
+CornerCut CutPair(const Exemplar& exemplar, const std::vector<Patch>& samples, const CornerPair& pair,
+                  int strip_height, GridCut& grid, std::vector<uint32_t>& scratch) {
+  const int half = strip_height / 2;
+  const int area = half * half;
+  scratch.resize(static_cast<size_t>(2) * area);
+  uint32_t* const out = scratch.data();
+  uint32_t* const in = out + area;
+  for (int j = 0; j < half; ++j) {
+    for (int i = 0; i < half; ++i) {
+      const int index = (half - 1 - j) * half + i;
+      out[index] = TexelOf(exemplar, samples, OutTexel(pair, i, j, strip_height));
+      in[index] = TexelOf(exemplar, samples, InTexel(pair, i, j, strip_height));
+    }
+  }
+  // Source side shows `out`, sink side `in`.
+  grid.Reset(half, half);
+  for (int y = 0; y < half; ++y) {
+    for (int x = 0; x < half; ++x) {
+      const int p = y * half + x;
+      const auto set_edge = [&](GridCut::Direction direction, int q) {
+        grid.SetEdge(x, y, direction, PairCost(exemplar, out[p], in[q], direction),
+                     PairCost(exemplar, in[p], out[q], direction));
+      };
+      if (x + 1 < half) {
+        set_edge(GridCut::kRight, p + 1);
+      } else if (const uint32_t beyond = exemplar.Step(out[p], GridCut::kRight); beyond != kNoTexel) {
+        grid.AddTerminals(x, y, PairCost(exemplar, in[p], beyond, GridCut::kRight), 0);
+      }
+      if (y + 1 < half) {
+        set_edge(GridCut::kDown, p + half);
+      }
+      if (y == 0) {
+        if (const uint32_t beyond = exemplar.Step(in[p], GridCut::kUp); beyond != kNoTexel) {
+          grid.AddTerminals(x, y, 0, PairCost(exemplar, out[p], beyond, GridCut::kUp));
+        }
+      }
+      if (y == half - 1) {
+        grid.AddTerminals(x, y, GridCut::kPinned, 0);
+      } else if (x == 0) {
+        grid.AddTerminals(x, y, 0, GridCut::kPinned);
+      }
+    }
+  }
+  CornerCut cut{.pair = pair, .in_wins = std::vector<uint8_t>(area), .cost = grid.Solve()};
+  for (int j = 0; j < half; ++j) {
+    for (int i = 0; i < half; ++i) {
+      cut.in_wins[static_cast<size_t>(j) * half + i] = grid.OnSourceSide(i, half - 1 - j) ? 0 : 1;
+    }
+  }
+  return cut;
+}
+
+// Share of a sample that another one covers in the unturned exemplar.
+double Overlap(const Exemplar& exemplar, const Patch& a, const Patch& b, int strip_height) {
+  const auto rectangle = [&](const Patch& patch) {
+    const uint32_t first = BtfelOfTexel(exemplar.TexelAt(patch.turn, patch.u, patch.v));
+    const uint32_t last = BtfelOfTexel(
+        exemplar.TexelAt(patch.turn, patch.u + strip_height / 2 - 1, patch.v + strip_height - 1));
+    const int width = exemplar.width();
+    const auto [x0, x1] = std::minmax<int>(first % width, last % width);
+    const auto [y0, y1] = std::minmax<int>(first / width, last / width);
+    return std::array<int, 4>{x0, y0, x1, y1};
+  };
+  const auto p = rectangle(a);
+  const auto q = rectangle(b);
+  const int w = std::min(p[2], q[2]) - std::max(p[0], q[0]) + 1;
+  const int h = std::min(p[3], q[3]) - std::max(p[1], q[1]) + 1;
+  return w <= 0 || h <= 0 ? 0.0 : static_cast<double>(w) * h / (strip_height * strip_height / 2);
+}
+
+// One start: state and improvement of all samples.
+class CornerSearch {
+ public:
+  CornerSearch(const ExemplarSpectra& spectra, const Arrangement& arrangement, int strip_height, uint64_t seed)
+      : exemplar_(spectra.exemplar()),
+        strip_height_(strip_height),
+        pairs_(CornerPairs(arrangement)),
+        search_(spectra),
+        rng_(seed) {
+    for (int strip = 0; strip < NumStrips(arrangement); ++strip) {
+      for (int end = 0; end < 2; ++end) {
+        turns_.push_back(TurnsOfStrip(arrangement, strip));
+        samples_.push_back(RandomPlace(turns_.back()));
+      }
+    }
+    for (int draw = 0; draw < kTypicalDraws; ++draw) {
+      const Statistics statistics = Measure(RandomPlace(turns_[draw % turns_.size()]));
+      typical_.mean_distance += statistics.mean_distance / kTypicalDraws;
+      typical_.variance += statistics.variance / kTypicalDraws;
+    }
+  }
+
+  void Improve(int sample, bool greedy, const std::stop_token& stop) {
+    MakeQuery(sample);
+    const std::vector<Candidate> candidates =
+        search_.Search(query_, turns_[sample], nullptr, 0.0, kCandidates, 1, stop);
+    const Patch before = samples_[sample];
+    std::vector<Patch> patches = {before};
+    std::vector<double> costs = {CostAround(sample)};
+    for (const Candidate& candidate : candidates) {
+      samples_[sample] = candidate.patch;
+      patches.push_back(candidate.patch);
+      costs.push_back(CostAround(sample));
+    }
+    const auto best = static_cast<size_t>(std::min_element(costs.begin(), costs.end()) - costs.begin());
+    samples_[sample] = patches[greedy ? best : Draw(costs, costs[best])];
+  }
+
+  // The mean mismatch of the cuts, with the prices of overlap and of standing out.
+  [[nodiscard]] double TotalCost() {
+    double cost = 0.0;
+    for (const CornerPair& pair : pairs_) {
+      cost += PairMismatch(pair);
+    }
+    double prices = 0.0;
+    for (int sample = 0; sample < num_samples(); ++sample) {
+      prices += Price(sample);
+    }
+    return cost / static_cast<double>(pairs_.size()) + prices / num_samples();
+  }
+
+  [[nodiscard]] int num_samples() const { return static_cast<int>(samples_.size()); }
+
+  [[nodiscard]] Corners Result() {
+    Corners corners{.strip_height = strip_height_, .samples = samples_, .cuts = {}};
+    for (const CornerPair& pair : pairs_) {
+      corners.cuts.push_back(CutPair(exemplar_, samples_, pair, strip_height_, grid_, scratch_));
+    }
+    return corners;
+  }
+
+ private:
+  // What the sample should look like: the mean of everything it meets, seen in its own frame.
+  void MakeQuery(int sample) {
+    const int half = strip_height_ / 2;
+    const int dims = exemplar_.search_dims();
+    query_.width = half;
+    query_.height = strip_height_;
+    query_.weights.assign(static_cast<size_t>(half) * strip_height_, 0.0f);
+    query_.wanted.assign(query_.weights.size() * dims, 0.0f);
+    const auto add = [&](const SampleTexel& own, const SampleTexel& other) {
+      if (own.sample != sample || other.sample == sample) {
+        return;
+      }
+      SampleTexel seen = other;
+      seen.turns = other.turns - own.turns + 4;
+      const float* const point = exemplar_.Point(TexelOf(exemplar_, samples_, seen));
+      const size_t index = static_cast<size_t>(own.y) * half + own.x;
+      query_.weights[index] += 1.0f;
+      for (int dim = 0; dim < dims; ++dim) {
+        query_.wanted[index * dims + dim] += point[dim];
+      }
+    };
+    for (const CornerPair& pair : pairs_) {
+      for (int j = 0; j < half; ++j) {
+        for (int i = 0; i < half; ++i) {
+          const SampleTexel out = OutTexel(pair, i, j, strip_height_);
+          const SampleTexel in = InTexel(pair, i, j, strip_height_);
+          add(out, in);
+          add(in, out);
+        }
+      }
+    }
+    for (size_t i = 0; i < query_.weights.size(); ++i) {
+      for (int dim = 0; dim < dims && query_.weights[i] > 0.0f; ++dim) {
+        query_.wanted[i * dims + dim] /= query_.weights[i];
+      }
+    }
+  }
+
+  // Of a cut, per texel of its shortest course, in mean steps.
+  [[nodiscard]] double PairMismatch(const CornerPair& pair) {
+    const CornerCut cut = CutPair(exemplar_, samples_, pair, strip_height_, grid_, scratch_);
+    return MismatchOfCost(static_cast<double>(cut.cost)) / (strip_height_ / 2);
+  }
+
+  [[nodiscard]] double Price(int sample) const {
+    double overlap = 0.0;
+    for (int other = 0; other < num_samples(); ++other) {
+      if (other != sample) {
+        overlap += Overlap(exemplar_, samples_[sample], samples_[other], strip_height_);
+      }
+    }
+    const Statistics statistics = Measure(samples_[sample]);
+    constexpr double kTiny = 1e-12;  // of a constant exemplar
+    return kOverlapPrice * overlap + kMeanPrice * statistics.mean_distance / (typical_.mean_distance + kTiny) +
+           kVariancePrice *
+               std::abs(std::log((statistics.variance + kTiny) / (typical_.variance + kTiny)));
+  }
+
+  // The part of TotalCost that depends on one sample, up to a constant factor of its cuts.
+  [[nodiscard]] double CostAround(int sample) {
+    double cost = 0.0;
+    for (const CornerPair& pair : pairs_) {
+      const int in = 2 * pair.in.strip + static_cast<int>(EndAtCorner(pair.in, false));
+      const int out = 2 * pair.out.strip + static_cast<int>(EndAtCorner(pair.out, true));
+      if (in == sample || out == sample) {
+        cost += PairMismatch(pair);
+      }
+    }
+    return cost / static_cast<double>(pairs_.size()) + Price(sample) / num_samples();
+  }
+
+  struct Statistics {
+    double mean_distance = 0.0;  // squared, of the sample's mean from the exemplar's
+    double variance = 0.0;       // about the sample's own mean
+  };
+
+  // In the search dimensions.
+  [[nodiscard]] Statistics Measure(const Patch& patch) const {
+    const int dims = exemplar_.search_dims();
+    const double count = strip_height_ * strip_height_ / 2;
+    std::array<double, kSearchDims> sum{};
+    double square = 0.0;
+    for (int y = 0; y < strip_height_; ++y) {
+      for (int x = 0; x < strip_height_ / 2; ++x) {
+        const float* const point = exemplar_.Point(exemplar_.TexelAt(patch.turn, patch.u + x, patch.v + y));
+        for (int dim = 0; dim < dims; ++dim) {
+          sum[dim] += point[dim];
+          square += static_cast<double>(point[dim]) * point[dim];
+        }
+      }
+    }
+    Statistics statistics;
+    double mean_square = 0.0;
+    for (int dim = 0; dim < dims; ++dim) {
+      const double mean = sum[dim] / count;
+      mean_square += mean * mean;
+      statistics.mean_distance += (mean - exemplar_.mean()[dim]) * (mean - exemplar_.mean()[dim]);
+    }
+    statistics.variance = square / count - mean_square;
+    return statistics;
+  }
+
+  [[nodiscard]] Patch RandomPlace(const std::vector<int>& turns) {
+    const int turn = turns[rng_.NextBelow(turns.size())];
+    return {turn, static_cast<int>(rng_.NextBelow(exemplar_.TurnedWidth(turn) - strip_height_ / 2 + 1)),
+            static_cast<int>(rng_.NextBelow(exemplar_.TurnedHeight(turn) - strip_height_ + 1))};
+  }
+
+  [[nodiscard]] size_t Draw(const std::vector<double>& costs, double best) {
+
+    double total = 0.0;
+    for (const double cost : costs) {
+      total += std::exp(-(cost - best) / kTemperature);
+    }
+    double draw = rng_.NextDouble() * total;
+    for (size_t i = 0; i < costs.size(); ++i) {
+      draw -= std::exp(-(costs[i] - best) / kTemperature);
+      if (draw < 0.0) {
+        return i;
+      }
+    }
+    return costs.size() - 1;
+  }
+
+  const Exemplar& exemplar_;
+  int strip_height_;
+  std::vector<CornerPair> pairs_;
+  CandidateSearch search_;
+  Rng rng_;
+  std::vector<std::vector<int>> turns_;  // [sample]
+  std::vector<Patch> samples_;
+  Statistics typical_;
+  SearchQuery query_;
+  GridCut grid_;
+  std::vector<uint32_t> scratch_;
+};
+
+}  // namespace
+
+const CornerCut& Corners::cut(const CornerPair& pair) const {
+  return *std::find_if(cuts.begin(), cuts.end(), [&](const CornerCut& cut) { return cut.pair == pair; });
+}
+
+absl::StatusOr<Corners> ChooseCorners(const ExemplarSpectra& spectra, const Arrangement& arrangement,
+                                      int strip_height, uint64_t seed, const RunContext& context) {
+  std::vector<Corners> results(kStarts);
+  std::vector<double> costs(kStarts, std::numeric_limits<double>::infinity());
+  ParallelFor(context, 0, kStarts, 1, [&](int64_t start, int64_t) {
+    CornerSearch search(spectra, arrangement, strip_height, Mix64(seed, static_cast<uint64_t>(start)));
+    for (int sweep = 0; sweep < kSweeps; ++sweep) {
+      for (int sample = 0; sample < search.num_samples(); ++sample) {
+        if (context.stop.stop_requested()) {
+          return;
+        }
+        search.Improve(sample, sweep == kSweeps - 1, context.stop);
+      }
+    }
+    costs[start] = search.TotalCost();
+    results[start] = search.Result();
+  });
+  TESSERA_RETURN_IF_ERROR(context.CheckStop());
+  const auto best = std::min_element(costs.begin(), costs.end()) - costs.begin();
+  return std::move(results[best]);
+}
+
+}  // namespace tessera

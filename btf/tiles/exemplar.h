@@ -1,0 +1,87 @@
+// The exemplar as synthesis sees it: texels with a turn as points of the embedding, and who lies beside whom.
+//
+// A texel is written as in a tile index: PackTexel(pixel, turns) with pixel = y * width + x of the unturned exemplar.
+// The exemplar turned by t is a picture of its own, of size TurnedSize(t); a patch is a rectangle of it.
+//
+//   uint32_t a = exemplar.TexelAt(/*turn=*/1, u, v);
+//   uint32_t right_of_a = exemplar.Step(a, GridCut::kRight);   // kNoTexel off the exemplar
+#pragma once
+
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "btf/codec/codec.h"
+#include "btf/tiles/max_flow.h"
+#include "btf/wang/tile_set.h"
+
+namespace tessera {
+
+inline constexpr uint32_t kNoTexel = 0xffffffffu;
+
+// Dimensions of the embedding: the prefix that ranks candidates, and all that cuts and thresholds see.
+inline constexpr int kSearchDims = 16;
+inline constexpr int kCutDims = 32;
+
+// `texel` seen after `turns` more quarter turns.
+constexpr uint32_t TurnTexel(uint32_t texel, int turns) {
+  return texel == kNoTexel ? kNoTexel : PackTexel(BtfelOfTexel(texel), TurnsOfTexel(texel) + turns);
+}
+
+class Exemplar {
+ public:
+  // Takes the first kCutDims dimensions; an embedding may have fewer.
+  explicit Exemplar(const Embedding& embedding);
+
+  [[nodiscard]] int width() const { return width_; }
+  [[nodiscard]] int height() const { return height_; }
+  [[nodiscard]] int num_pixels() const { return width_ * height_; }
+  [[nodiscard]] int TurnedWidth(int turn) const { return (turn & 1) == 0 ? width_ : height_; }
+  [[nodiscard]] int TurnedHeight(int turn) const { return (turn & 1) == 0 ? height_ : width_; }
+
+  // The texel at column u, row v of the exemplar turned by `turn`.
+  [[nodiscard]] uint32_t TexelAt(int turn, int u, int v) const;
+  // The inverse: column and row in the exemplar turned by TurnsOfTexel(texel).
+  [[nodiscard]] std::array<int, 2> TurnedPosition(uint32_t texel) const;
+  // The texel `dx` columns right and `dy` rows down of `texel` in its turned exemplar, kNoTexel off it.
+  [[nodiscard]] uint32_t Shift(uint32_t texel, int dx, int dy) const;
+  // The texel beside it in a GridCut::Direction. Directions count counter-clockwise, as turns do.
+  [[nodiscard]] uint32_t Step(uint32_t texel, int direction) const {
+    const int turns = TurnsOfTexel(texel);
+    const uint32_t pixel = beside_[static_cast<size_t>((direction - turns) & 3) * num_pixels() + BtfelOfTexel(texel)];
+    return pixel == kNoTexel ? kNoTexel : PackTexel(pixel, turns);
+  }
+
+  // Number of floats of a point, a multiple of 8; those past the embedding's dimensions are 0.
+  [[nodiscard]] int dims() const { return dims_; }
+  [[nodiscard]] int search_dims() const { return search_dims_; }
+  [[nodiscard]] const float* Point(uint32_t texel) const {
+    return values_.data() +
+           (static_cast<size_t>(TurnsOfTexel(texel)) * num_pixels() + BtfelOfTexel(texel)) * dims_;
+  }
+  [[nodiscard]] float Distance(uint32_t a, uint32_t b) const;
+
+  // Mean and 99.9th percentile of the distance between neighbours: what mismatches are measured in.
+  [[nodiscard]] double mean_step() const { return mean_step_; }
+  [[nodiscard]] double large_step() const { return large_step_; }
+  // Over all texels in all turns, [dims].
+  [[nodiscard]] const std::vector<double>& mean() const { return mean_; }
+  // Mean squared distance, in the search dimensions, of two texels drawn at random.
+  [[nodiscard]] double search_spread() const { return search_spread_; }
+
+ private:
+  int width_ = 0;
+  int height_ = 0;
+  int dims_ = 0;
+  int search_dims_ = 0;
+  double mean_step_ = 0.0;
+  double large_step_ = 0.0;
+  double search_spread_ = 0.0;
+  std::vector<double> mean_;
+  std::vector<float> values_;     // [turn][pixel][dims]
+  std::vector<uint32_t> beside_;  // [direction][pixel] of the unturned exemplar, kNoTexel off it
+};
+
+}  // namespace tessera

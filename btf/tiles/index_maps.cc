@@ -1,0 +1,165 @@
+#include "btf/tiles/index_maps.h"
+
+#include <algorithm>
+#include <mutex>
+
+#include <absl/strings/cord.h>
+#include <absl/strings/str_format.h>
+
+#include "btf/base/parallel.h"
+#include "btf/base/rng.h"
+#include "btf/base/status_macros.h"
+#include "btf/tiles/frames.h"
+#include "btf/tiles/interior.h"
+
+namespace tessera {
+namespace {
+
+constexpr int kSmallestStrip = 8;
+constexpr int kSmallestExemplar = 32;
+// The BTFel number of a packed texel has 30 bits; tiles of 16,384 texels are far beyond any use.
+constexpr int kLargestTile = 16384;
+// Tiles are made in groups; after each, what its tiles used makes the same places dearer for the next. The group is
+// the same for any number of threads, so the result is too.
+constexpr int kTilesPerGroup = 8;
+
+enum SeedStage : uint64_t { kCornerSeed = 1, kStripSeed = 2, kTileSeed = 3 };
+
+absl::Status WithReason(absl::Status status, absl::string_view reason) {
+  status.SetPayload(kReasonPayload, absl::Cord(reason));
+  return status;
+}
+
+absl::Status CheckReached(const FillReport& report, const SynthesisParams& params, absl::string_view what) {
+  if (report.reached) {
+    return absl::OkStatus();
+  }
+  return WithReason(
+      absl::FailedPreconditionError(absl::StrFormat(
+          "%s: after %d patches the mean mismatch along its seams is %.2f mean steps (limit %.2f), the largest %.2f "
+          "large steps (limit %.2f)",
+          what, report.num_patches, report.mean_mismatch, params.mean_threshold, report.largest_mismatch,
+          params.texel_threshold)),
+      "THRESHOLD_NOT_REACHED");
+}
+
+}  // namespace
+
+absl::Status CheckSizes(int exemplar_width, int exemplar_height, const SynthesisParams& params) {
+  const int height = params.strip_height;
+  if (height < kSmallestStrip || height % 2 != 0) {
+    return absl::InvalidArgumentError(
+        absl::StrFormat("strip height %d: must be even and at least %d", height, kSmallestStrip));
+  }
+  if (params.tile_size < 2 * height || params.tile_size > kLargestTile) {
+    return absl::InvalidArgumentError(
+        absl::StrFormat("tile size %d: must be in [%d, %d] for strips %d high", params.tile_size, 2 * height,
+                        kLargestTile, height));
+  }
+  if (!(params.mean_threshold > 0.0) || !(params.texel_threshold > 0.0)) {
+    return absl::InvalidArgumentError(absl::StrFormat("thresholds %g and %g: must be above 0",
+                                                      params.mean_threshold, params.texel_threshold));
+  }
+  const int needed = std::max(kSmallestExemplar, 2 * height);
+  if (exemplar_width < needed || exemplar_height < needed) {
+    return WithReason(
+        absl::InvalidArgumentError(absl::StrFormat("material %dx%d: strips %d high need at least %dx%d texels",
+                                                   exemplar_width, exemplar_height, height, needed, needed)),
+        "MATERIAL_TOO_SMALL");
+  }
+  return absl::OkStatus();
+}
+
+absl::StatusOr<IndexMaps> SynthesizeIndexMaps(const Exemplar& exemplar, const Arrangement& arrangement,
+                                              const SynthesisParams& params, const RunContext& context) {
+  TESSERA_RETURN_IF_ERROR(CheckSizes(exemplar.width(), exemplar.height(), params));
+  const int num_tiles = static_cast<int>(arrangement.codes.size());
+  const int num_strips = NumStrips(arrangement);
+  const int size = params.tile_size;
+  const size_t tile_area = static_cast<size_t>(size) * size;
+
+  std::vector<int> turns = TurnsOfInterior(arrangement);
+  for (int strip = 0; strip < num_strips; ++strip) {
+    for (const int turn : TurnsOfStrip(arrangement, strip)) {
+      if (std::find(turns.begin(), turns.end(), turn) == turns.end()) {
+        turns.push_back(turn);
+      }
+    }
+  }
+  const ExemplarSpectra spectra(exemplar, turns, context);
+  TESSERA_RETURN_IF_ERROR(context.CheckStop());
+
+  context.Report("corners", 0, 1, "sets");
+  TESSERA_ASSIGN_OR_RETURN(const Corners corners,
+                           ChooseCorners(spectra, arrangement, params.strip_height,
+                                         Mix64(params.seed, kCornerSeed), context));
+  context.Report("corners", 1, 1, "sets");
+
+  IndexMaps maps{.tile_size = size,
+                 .texels = std::vector<uint32_t>(tile_area * num_tiles, kNoTexel),
+                 .strips = std::vector<Strip>(num_strips),
+                 .tile_reports = std::vector<FillReport>(num_tiles)};
+  for (const CornerCut& cut : corners.cuts) {
+    maps.corner_cost += cut.cost;
+  }
+  maps.corner_seams = static_cast<int64_t>(corners.cuts.size());
+
+  std::mutex mutex;
+  int done = 0;
+  const auto count_one = [&](std::string_view stage, int total) {
+    const std::lock_guard lock(mutex);
+    context.Report(stage, ++done, total, stage);
+  };
+  const auto fill_params = [&](uint64_t stage, int item) {
+    FillParams fill;
+    fill.feature_size = params.strip_height;
+    fill.seed = Mix64(Mix64(params.seed, stage), static_cast<uint64_t>(item));
+    fill.mean_threshold = params.mean_threshold;
+    fill.texel_threshold = params.texel_threshold;
+    return fill;
+  };
+
+  std::vector<absl::Status> statuses(num_strips);
+  ParallelFor(context, 0, num_strips, 1, [&](int64_t begin, int64_t) {
+    const int strip = static_cast<int>(begin);
+    FillParams fill = fill_params(kStripSeed, strip);
+    fill.turns = TurnsOfStrip(arrangement, strip);
+    statuses[strip] = SynthesizeStrip(spectra, corners, strip, size, fill, context, maps.strips[strip]);
+    count_one("strips", num_strips);
+  });
+  TESSERA_RETURN_IF_ERROR(context.CheckStop());
+  for (int strip = 0; strip < num_strips; ++strip) {
+    TESSERA_RETURN_IF_ERROR(statuses[strip]);
+    TESSERA_RETURN_IF_ERROR(CheckReached(maps.strips[strip].report, params, absl::StrFormat("strip %d", strip)));
+  }
+
+  UsageMap usage(exemplar.width(), exemplar.height());
+  done = 0;
+  statuses.assign(num_tiles, absl::OkStatus());
+  for (int group = 0; group < num_tiles; group += kTilesPerGroup) {
+    const int group_end = std::min(num_tiles, group + kTilesPerGroup);
+    ParallelFor(context, group, group_end, 1, [&](int64_t begin, int64_t) {
+      const int tile = static_cast<int>(begin);
+      const std::span<uint32_t> texels = std::span(maps.texels).subspan(tile * tile_area, tile_area);
+      const std::vector<uint32_t> frame =
+          BuildFrame(arrangement, SidesFromTileCode(arrangement.codes[tile]), corners, maps.strips);
+      std::copy(frame.begin(), frame.end(), texels.begin());
+      FillParams fill = fill_params(kTileSeed, tile);
+      fill.turns = TurnsOfInterior(arrangement);
+      fill.usage = &usage;
+      statuses[tile] = SynthesizeInterior(spectra, size, fill, context, texels, maps.tile_reports[tile]);
+      count_one("tiles", num_tiles);
+    });
+    TESSERA_RETURN_IF_ERROR(context.CheckStop());
+    for (int tile = group; tile < group_end; ++tile) {
+      TESSERA_RETURN_IF_ERROR(statuses[tile]);
+      TESSERA_RETURN_IF_ERROR(CheckReached(maps.tile_reports[tile], params,
+                                           absl::StrFormat("tile %d (code %d)", tile, arrangement.codes[tile])));
+      usage.Count(std::span(maps.texels).subspan(tile * tile_area, tile_area));
+    }
+    usage.Finish();
+  }
+  return maps;
+}
+
+}  // namespace tessera

@@ -1,0 +1,28 @@
+#include "btf/tiles/interior.h"
+
+#include <algorithm>
+
+#include "btf/base/status_macros.h"
+
+namespace tessera {
+
+absl::Status SynthesizeInterior(const ExemplarSpectra& spectra, int size, const FillParams& params,
+                                const RunContext& context, std::span<uint32_t> texels, FillReport& report) {
+  Canvas canvas(spectra.exemplar(), size, size);
+  for (int y = 0; y < size; ++y) {
+    for (int x = 0; x < size; ++x) {
+      if (const uint32_t texel = texels[static_cast<size_t>(y) * size + x]; texel != kNoTexel) {
+        canvas.Set(x, y, texel);
+      }
+      if (x == 0 || y == 0 || x == size - 1 || y == size - 1) {
+        canvas.Fix(x, y);
+      }
+    }
+  }
+  Filler filler(spectra);
+  TESSERA_RETURN_IF_ERROR(filler.Fill(params, context, canvas, report));
+  std::copy(canvas.texels().begin(), canvas.texels().end(), texels.begin());
+  return absl::OkStatus();
+}
+
+}  // namespace tessera

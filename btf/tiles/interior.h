@@ -1,0 +1,19 @@
+// Step 4 of synthesis: the inside of a tile, filled within its frame.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include <absl/status/status.h>
+
+#include "btf/tiles/filler.h"
+
+namespace tessera {
+
+// Fills and improves `texels`, [size][size] with kNoTexel where empty. Frame texels may be replaced, those of the
+// border row not: they must agree with the neighbouring tile. Errors: CANCELLED.
+absl::Status SynthesizeInterior(const ExemplarSpectra& spectra, int size, const FillParams& params,
+                                const RunContext& context, std::span<uint32_t> texels, FillReport& report);
+
+}  // namespace tessera
