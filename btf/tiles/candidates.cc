@@ -22,7 +22,8 @@ constexpr int kLinePadding = 8;
 static_assert(sizeof(kiss_fft_cpx) == sizeof(Complex));
 
 void Transform(kiss_fft_cfg plan, const Complex* in, Complex* out, int in_stride) {
-  kiss_fft_stride(plan, reinterpret_cast<const kiss_fft_cpx*>(in), reinterpret_cast<kiss_fft_cpx*>(out), in_stride);
+  kiss_fft_stride(plan, reinterpret_cast<const kiss_fft_cpx*>(in), reinterpret_cast<kiss_fft_cpx*>(out),
+                  in_stride);
 }
 
 // The value of search channel `channel` (dimensions, then the squared length, then 0) of a texel.
@@ -61,7 +62,8 @@ struct ExemplarSpectra::Plans {
   kiss_fft_cfg forward = nullptr;
   kiss_fft_cfg inverse = nullptr;
   explicit Plans(int size)
-      : forward(kiss_fft_alloc(size, 0, nullptr, nullptr)), inverse(kiss_fft_alloc(size, 1, nullptr, nullptr)) {}
+      : forward(kiss_fft_alloc(size, 0, nullptr, nullptr)),
+        inverse(kiss_fft_alloc(size, 1, nullptr, nullptr)) {}
   ~Plans() {
     kiss_fft_free(forward);
     kiss_fft_free(inverse);
@@ -119,7 +121,8 @@ void UsageMap::Finish() {
     uint64_t row = 0;
     for (int x = 0; x < width_; ++x) {
       row += counts_[static_cast<size_t>(y) * width_ + x];
-      sums_[static_cast<size_t>(y + 1) * (width_ + 1) + x + 1] = sums_[static_cast<size_t>(y) * (width_ + 1) + x + 1] + row;
+      sums_[static_cast<size_t>(y + 1) * (width_ + 1) + x + 1] =
+          sums_[static_cast<size_t>(y) * (width_ + 1) + x + 1] + row;
     }
   }
 }
@@ -132,8 +135,10 @@ double UsageMap::RelativeUse(const Patch& patch, int width, int height) const {
   const bool lying = (patch.turn & 1) != 0;
   const int across = lying ? height : width;
   const int down = lying ? width : height;
-  const std::array<int, 4> x_of_turn = {patch.u, width_ - patch.v - height, width_ - patch.u - width, patch.v};
-  const std::array<int, 4> y_of_turn = {patch.v, patch.u, height_ - patch.v - height, height_ - patch.u - width};
+  const std::array<int, 4> x_of_turn = {patch.u, width_ - patch.v - height, width_ - patch.u - width,
+                                        patch.v};
+  const std::array<int, 4> y_of_turn = {patch.v, patch.u, height_ - patch.v - height,
+                                        height_ - patch.u - width};
   const int x0 = x_of_turn[patch.turn];
   const int y0 = y_of_turn[patch.turn];
   const auto sum = [&](int x, int y) { return sums_[static_cast<size_t>(y) * (width_ + 1) + x]; };
@@ -189,7 +194,8 @@ std::vector<Candidate> CandidateSearch::Search(const SearchQuery& query, const s
     for (int y = 0; y < query.height; ++y) {
       for (int x = 0; x < query.width; ++x) {
         const int i = y * query.width + x;
-        plane_[static_cast<size_t>(y) * stride + x] = {query_value(i, 2 * channel), query_value(i, 2 * channel + 1)};
+        plane_[static_cast<size_t>(y) * stride + x] = {query_value(i, 2 * channel),
+                                                       query_value(i, 2 * channel + 1)};
       }
     }
     Forward2d(spectra_->plans_->forward, size, query.height, plane_, line_, query_spectra_[channel]);
@@ -209,7 +215,8 @@ std::vector<Candidate> CandidateSearch::Search(const SearchQuery& query, const s
     std::fill(sum_.begin(), sum_.end(), Complex{});
     for (int channel = 0; channel < spectra_->channels_; ++channel) {
       const float* q = reinterpret_cast<const float*>(query_spectra_[channel].data());
-      const float* e = reinterpret_cast<const float*>(spectra_->spectra_[turn].data() + channel * plane_.size());
+      const float* e =
+          reinterpret_cast<const float*>(spectra_->spectra_[turn].data() + channel * plane_.size());
       float* s = reinterpret_cast<float*>(sum_.data());
       const size_t length = 2 * plane_.size();
       for (size_t i = 0; i < length; i += 2) {
@@ -217,7 +224,8 @@ std::vector<Candidate> CandidateSearch::Search(const SearchQuery& query, const s
         s[i + 1] += q[i] * e[i + 1] - q[i + 1] * e[i];
       }
     }
-    // Lines of the spectrum are columns of the plane: transform along v first, then along u for the rows in use.
+    // Lines of the spectrum are columns of the plane: transform along v first, then along u for the rows in
+    // use.
     for (int x = 0; x < size; ++x) {
       Transform(spectra_->plans_->inverse, sum_.data() + static_cast<size_t>(x) * stride, line_.data(), 1);
       std::copy_n(line_.data(), size, turned_plane_.data() + static_cast<size_t>(x) * stride);
@@ -236,10 +244,13 @@ std::vector<Candidate> CandidateSearch::Search(const SearchQuery& query, const s
   // A generous prefix in order of cost, thinned so that no two are near each other.
   const auto before = [](const Candidate& a, const Candidate& b) {
     return a.cost != b.cost ? a.cost < b.cost
-                            : std::tuple(a.patch.turn, a.patch.v, a.patch.u) < std::tuple(b.patch.turn, b.patch.v, b.patch.u);
+                            : std::tuple(a.patch.turn, a.patch.v, a.patch.u) <
+                                  std::tuple(b.patch.turn, b.patch.v, b.patch.u);
   };
-  const size_t prefix = std::min(offsets_.size(), static_cast<size_t>(count) * (2 * separation + 1) * (2 * separation + 1));
-  std::partial_sort(offsets_.begin(), offsets_.begin() + static_cast<std::ptrdiff_t>(prefix), offsets_.end(), before);
+  const size_t prefix =
+      std::min(offsets_.size(), static_cast<size_t>(count) * (2 * separation + 1) * (2 * separation + 1));
+  std::partial_sort(offsets_.begin(), offsets_.begin() + static_cast<std::ptrdiff_t>(prefix), offsets_.end(),
+                    before);
   std::vector<Candidate> best;
   for (size_t i = 0; i < prefix && static_cast<int>(best.size()) < count; ++i) {
     const Patch& patch = offsets_[i].patch;
@@ -254,7 +265,8 @@ std::vector<Candidate> CandidateSearch::Search(const SearchQuery& query, const s
   return best;
 }
 
-std::vector<Candidate> SampleCandidates(std::vector<Candidate> candidates, int count, double temperature, Rng& rng) {
+std::vector<Candidate> SampleCandidates(std::vector<Candidate> candidates, int count, double temperature,
+                                        Rng& rng) {
   std::vector<Candidate> chosen;
   if (candidates.empty()) {
     return chosen;

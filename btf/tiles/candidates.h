@@ -1,9 +1,9 @@
-// Where in the exemplar a window of the canvas finds patches like itself: all offsets of all turns at once, by FFT
-// cross-correlation over the embedding, then a choice among the best.
+// Where in the exemplar a window of the canvas finds patches like itself: all offsets of all turns at once,
+// by FFT cross-correlation over the embedding, then a choice among the best.
 //
-// With weights w and wanted points c, the cost of an offset is sum w |c - e|^2 = sum w |c|^2 - 2 sum (w c) e +
-// sum w |e|^2: one correlation a dimension and one with |e|^2. Channels are correlated in pairs: the real part of
-// corr(q1 + i q2, e1 + i e2) is corr(q1, e1) + corr(q2, e2).
+// With weights w and wanted points c, the cost of an offset is sum w |c - e|^2 = sum w |c|^2 - 2 sum (w c) e
+// + sum w |e|^2: one correlation a dimension and one with |e|^2. Channels are correlated in pairs: the real
+// part of corr(q1 + i q2, e1 + i e2) is corr(q1, e1) + corr(q2, e2).
 #pragma once
 
 #include <complex>
@@ -47,8 +47,8 @@ class UsageMap {
   void Count(std::span<const uint32_t> texels);
   // Call after the last Count, before MeanIn.
   void Finish();
-  // Mean uses of a pixel in a rectangle of the turned exemplar, as a multiple of the mean over the whole exemplar; 0
-  // while nothing was counted.
+  // Mean uses of a pixel in a rectangle of the turned exemplar, as a multiple of the mean over the whole
+  // exemplar; 0 while nothing was counted.
   [[nodiscard]] double RelativeUse(const Patch& patch, int width, int height) const;
 
  private:
@@ -77,14 +77,14 @@ class CandidateSearch {
   explicit CandidateSearch(const ExemplarSpectra& spectra);
   ~CandidateSearch();
 
-  // At most `count` candidates among `turns`, best first, no two within `separation` texels of each other in both
-  // axes of the same turn. `usage` may be null; a patch used twice as often as the mean costs `repetition` more.
-  // Empty when the window fits no turn or after a stop request.
-  std::vector<Candidate> Search(const SearchQuery& query, const std::vector<int>& turns, const UsageMap* usage,
-                                double repetition, int count, int separation, const std::stop_token& stop);
+  // At most `count` candidates among `turns`, best first, no two within `separation` texels of each other in
+  // both axes of the same turn. `usage` may be null; a patch used twice as often as the mean costs
+  // `repetition` more. Empty when the window fits no turn or after a stop request.
+  std::vector<Candidate> Search(const SearchQuery& query, const std::vector<int>& turns,
+                                const UsageMap* usage, double repetition, int count, int separation,
+                                const std::stop_token& stop);
 
  private:
-
   const ExemplarSpectra* spectra_;
   std::vector<std::complex<float>> plane_, turned_plane_, sum_;
   std::vector<std::vector<std::complex<float>>> query_spectra_;  // [channel]
@@ -92,8 +92,9 @@ class CandidateSearch {
   std::vector<Candidate> offsets_;
 };
 
-// Draws `count` candidates without replacement. One whose cost exceeds the best by the share `temperature` of it has
-// 1/e of its chance.
-std::vector<Candidate> SampleCandidates(std::vector<Candidate> candidates, int count, double temperature, Rng& rng);
+// Draws `count` candidates without replacement. One whose cost exceeds the best by the share `temperature` of
+// it has 1/e of its chance.
+std::vector<Candidate> SampleCandidates(std::vector<Candidate> candidates, int count, double temperature,
+                                        Rng& rng);
 
 }  // namespace tessera

@@ -13,16 +13,16 @@
 namespace tessera {
 namespace {
 
-constexpr int kStarts = 6;       // random starts
+constexpr int kStarts = 8;       // random starts
 constexpr int kSweeps = 4;       // over all samples; the last is greedy
 constexpr int kCandidates = 80;  // cut for each sample and sweep
-// What a set of samples costs: the mean mismatch of its cuts in mean steps, plus these prices. A sample wholly inside
-// another one, on average over the samples:
+// What a set of samples costs: the mean mismatch of its cuts in mean steps, plus these prices. A sample
+// wholly inside another one, on average over the samples:
 constexpr double kOverlapPrice = 1.0;
-// A sample that stands out: the squared distance of its mean from the exemplar's, against that of a sample drawn at
-// random, and the absolute logarithm of its variance against the same. Every vertex of a dressed mesh shows corner
-// samples, so one that is bland or striking would draw the grid.
-constexpr double kMeanPrice = 0.1;
+// A sample that stands out: the squared distance of its mean from the exemplar's, against that of a sample
+// drawn at random, and the absolute logarithm of its variance against the same. Every vertex of a dressed
+// mesh shows corner samples, so one that is bland or striking would draw the grid.
+constexpr double kMeanPrice = 0.2;
 constexpr double kVariancePrice = 0.3;
 constexpr double kTemperature = 0.02;  // of the draw, in mean steps
 constexpr int kTypicalDraws = 256;     // random samples that tell what is typical
@@ -97,6 +97,10 @@ CornerCut CutPair(const Exemplar& exemplar, const std::vector<Patch>& samples, c
     }
   }
   CornerCut cut{.pair = pair, .in_wins = std::vector<uint8_t>(area), .cost = grid.Solve()};
+  // Across side `in`, the neighbouring tile shows the other half of that strip up to the vertex, here `out`
+  // does.
+  const uint32_t across = TexelOf(exemplar, samples, InTexel(pair, -1, 0, strip_height));
+  cut.cost += PairCost(exemplar, out[(half - 1) * half], across, GridCut::kLeft);
   for (int j = 0; j < half; ++j) {
     for (int i = 0; i < half; ++i) {
       cut.in_wins[static_cast<size_t>(j) * half + i] = grid.OnSourceSide(i, half - 1 - j) ? 0 : 1;
@@ -126,7 +130,8 @@ double Overlap(const Exemplar& exemplar, const Patch& a, const Patch& b, int str
 // One start: state and improvement of all samples.
 class CornerSearch {
  public:
-  CornerSearch(const ExemplarSpectra& spectra, const Arrangement& arrangement, int strip_height, uint64_t seed)
+  CornerSearch(const ExemplarSpectra& spectra, const Arrangement& arrangement, int strip_height,
+               uint64_t seed)
       : exemplar_(spectra.exemplar()),
         strip_height_(strip_height),
         pairs_(CornerPairs(arrangement)),
@@ -238,9 +243,9 @@ class CornerSearch {
     }
     const Statistics statistics = Measure(samples_[sample]);
     constexpr double kTiny = 1e-12;  // of a constant exemplar
-    return kOverlapPrice * overlap + kMeanPrice * statistics.mean_distance / (typical_.mean_distance + kTiny) +
-           kVariancePrice *
-               std::abs(std::log((statistics.variance + kTiny) / (typical_.variance + kTiny)));
+    return kOverlapPrice * overlap +
+           kMeanPrice * statistics.mean_distance / (typical_.mean_distance + kTiny) +
+           kVariancePrice * std::abs(std::log((statistics.variance + kTiny) / (typical_.variance + kTiny)));
   }
 
   // The part of TotalCost that depends on one sample, up to a constant factor of its cuts.
@@ -261,13 +266,14 @@ class CornerSearch {
     double variance = 0.0;       // about the sample's own mean
   };
 
-  // In the search dimensions.
+  // Of the middle rows, those nearest the vertex, in the search dimensions.
   [[nodiscard]] Statistics Measure(const Patch& patch) const {
     const int dims = exemplar_.search_dims();
-    const double count = strip_height_ * strip_height_ / 2;
+    const int margin = strip_height_ / 4;
+    const double count = (strip_height_ - 2 * margin) * (strip_height_ / 2);
     std::array<double, kSearchDims> sum{};
     double square = 0.0;
-    for (int y = 0; y < strip_height_; ++y) {
+    for (int y = margin; y < strip_height_ - margin; ++y) {
       for (int x = 0; x < strip_height_ / 2; ++x) {
         const float* const point = exemplar_.Point(exemplar_.TexelAt(patch.turn, patch.u + x, patch.v + y));
         for (int dim = 0; dim < dims; ++dim) {
@@ -294,7 +300,6 @@ class CornerSearch {
   }
 
   [[nodiscard]] size_t Draw(const std::vector<double>& costs, double best) {
-
     double total = 0.0;
     for (const double cost : costs) {
       total += std::exp(-(cost - best) / kTemperature);

@@ -1,11 +1,12 @@
-// Step 1 of synthesis: the two end samples of every strip, chosen together, and the cuts between those that meet.
+// Step 1 of synthesis: the two end samples of every strip, chosen together, and the cuts between those that
+// meet.
 //
-//        j ^  in          At a corner of a tile, side `in` ends and side `out` starts. Seen with `out` lying along
-//          | +----+       the bottom, both cover the h/2 x h/2 square at the vertex; i counts along `out`, j up.
-//          | |in /|       A cut from the vertex to the opposite corner of the square parts them. It is pinned: row
-//          | |  / |       j = 0 shows `out`, column i = 0 above it shows `in`, the texel at the vertex `out`.
-//          | | /  |
-//          | |/out|
+//        j ^  in          At a corner of a tile, side `in` ends and side `out` starts. Seen with `out` lying
+//        along
+//          | +----+       the bottom, both cover the h/2 x h/2 square at the vertex; i counts along `out`, j
+//          up. | |in /|       A cut from the vertex to the opposite corner of the square parts them. It is
+//          pinned: row | |  / |       j = 0 shows `out`, column i = 0 above it shows `in`, the texel at the
+//          vertex `out`. | | /  | | |/out|
 //          +-+----+---> i
 #pragma once
 
@@ -24,7 +25,8 @@ namespace tessera {
 struct CornerCut {
   CornerPair pair;
   std::vector<uint8_t> in_wins;  // [j][i], h/2 x h/2
-  int64_t cost = 0;              // in the units of PairCost
+  // In the units of PairCost: of the cut, and of the vertex texel against the one across side `in`.
+  int64_t cost = 0;
 };
 
 struct Corners {
@@ -39,10 +41,10 @@ struct Corners {
   [[nodiscard]] const CornerCut& cut(const CornerPair& pair) const;
 };
 
-// Several random starts, each improved sample by sample: the best places for one sample against the mean of all it
-// meets come from a search, the choice among them from the true cuts, drawn at first and greedy at the end. Samples
-// that overlap in the exemplar pay for it, so that not one patch serves every corner.
-// Errors: CANCELLED.
+// Several random starts, each improved sample by sample: the best places for one sample against the mean of
+// all it meets come from a search, the choice among them from the true cuts, drawn at first and greedy at the
+// end. Samples that overlap in the exemplar pay for it, so that not one patch serves every corner. Errors:
+// CANCELLED.
 absl::StatusOr<Corners> ChooseCorners(const ExemplarSpectra& spectra, const Arrangement& arrangement,
                                       int strip_height, uint64_t seed, const RunContext& context);
 

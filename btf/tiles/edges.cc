@@ -6,8 +6,9 @@
 
 namespace tessera {
 
-absl::Status SynthesizeStrip(const ExemplarSpectra& spectra, const Corners& corners, int strip_index, int tile_size,
-                             const FillParams& params, const RunContext& context, Strip& strip) {
+absl::Status SynthesizeStrip(const ExemplarSpectra& spectra, const Corners& corners, int strip_index,
+                             int tile_size, const FillParams& params, const RunContext& context,
+                             Strip& strip) {
   const Exemplar& exemplar = spectra.exemplar();
   const int height = corners.strip_height;
   const int half = height / 2;
@@ -29,12 +30,13 @@ absl::Status SynthesizeStrip(const ExemplarSpectra& spectra, const Corners& corn
   const int right_of_start =
       std::min(tile_size - height, exemplar.TurnedWidth(start.turn) - (start.u + half));
   if (right_of_start > 0) {
-    filler.Lay({half, 0, right_of_start, height}, {start.turn, start.u + half, start.v}, canvas, strip.report);
+    filler.Lay({half, 0, right_of_start, height}, {start.turn, start.u + half, start.v}, canvas,
+               strip.report);
   }
   const int left_of_end = std::min(tile_size - height, end.u);
   if (left_of_end > 0) {
-    filler.Lay({tile_size - half - left_of_end, 0, left_of_end, height}, {end.turn, end.u - left_of_end, end.v},
-               canvas, strip.report);
+    filler.Lay({tile_size - half - left_of_end, 0, left_of_end, height},
+               {end.turn, end.u - left_of_end, end.v}, canvas, strip.report);
   }
   TESSERA_RETURN_IF_ERROR(filler.Fill(params, context, canvas, strip.report));
   strip.width = tile_size;

@@ -5,9 +5,8 @@
 namespace tessera {
 namespace {
 
-constexpr int kLane = 8;                    // floats of an AVX register
-constexpr double kLargeStepShare = 0.999;   // the percentile that large_step names
-constexpr double kSmallestStep = 1e-6;      // of a constant exemplar: keeps ratios finite
+constexpr int kLane = 8;                // floats of an AVX register
+constexpr double kSmallestStep = 1e-6;  // of a constant exemplar: keeps ratios finite
 
 int RoundUp(int n, int multiple) {
   return (n + multiple - 1) / multiple * multiple;
@@ -34,30 +33,22 @@ Exemplar::Exemplar(const Embedding& embedding)
     }
   }
 
-  std::vector<float> steps;
-  steps.reserve(size_t{2} * num_pixels());
+  double sum = 0.0;
+  int64_t num_steps = 0;
   for (int y = 0; y < height_; ++y) {
     for (int x = 0; x < width_; ++x) {
       const uint32_t texel = TexelAt(0, x, y);
       for (const int direction : {GridCut::kRight, GridCut::kDown}) {
         if (const uint32_t neighbour = Step(texel, direction); neighbour != kNoTexel) {
-          steps.push_back(Distance(texel, neighbour));
+          sum += Distance(texel, neighbour);
+          ++num_steps;
         }
       }
     }
   }
-  double sum = 0.0;
-  for (const float step : steps) {
-    sum += step;
-  }
-  mean_step_ = std::max(kSmallestStep, sum / static_cast<double>(std::max<size_t>(1, steps.size())));
-  large_step_ = mean_step_;
-  if (!steps.empty()) {
-    const auto rank = static_cast<std::ptrdiff_t>(kLargeStepShare * static_cast<double>(steps.size() - 1));
-    std::nth_element(steps.begin(), steps.begin() + rank, steps.end());
-    large_step_ = std::max<double>(mean_step_, steps[rank]);
-  }
+  mean_step_ = std::max(kSmallestStep, sum / static_cast<double>(std::max<int64_t>(1, num_steps)));
 
+  double spread_square = 0.0;
   for (int dim = 0; dim < dims_; ++dim) {
     double mean = 0.0;
     double square = 0.0;
@@ -68,8 +59,11 @@ Exemplar::Exemplar(const Embedding& embedding)
     }
     const double count = 4.0 * num_pixels();
     mean_.push_back(mean / count);
-    search_spread_ += dim >= search_dims_ ? 0.0 : 2.0 * (square / count - (mean / count) * (mean / count));
+    const double variance = square / count - (mean / count) * (mean / count);
+    spread_square += 2.0 * variance;
+    search_spread_ += dim < search_dims_ ? 2.0 * variance : 0.0;
   }
+  spread_ = std::max(kSmallestStep, std::sqrt(spread_square));
   search_spread_ = std::max(search_spread_, kSmallestStep * kSmallestStep);
 }
 
@@ -135,7 +129,8 @@ float Exemplar::Distance(uint32_t a, uint32_t b) const {
       lanes[j] += difference * difference;
     }
   }
-  return std::sqrt(((lanes[0] + lanes[4]) + (lanes[1] + lanes[5])) + ((lanes[2] + lanes[6]) + (lanes[3] + lanes[7])));
+  return std::sqrt(((lanes[0] + lanes[4]) + (lanes[1] + lanes[5])) +
+                   ((lanes[2] + lanes[6]) + (lanes[3] + lanes[7])));
 }
 
 }  // namespace tessera

@@ -1,7 +1,8 @@
 // The exemplar as synthesis sees it: texels with a turn as points of the embedding, and who lies beside whom.
 //
-// A texel is written as in a tile index: PackTexel(pixel, turns) with pixel = y * width + x of the unturned exemplar.
-// The exemplar turned by t is a picture of its own, of size TurnedSize(t); a patch is a rectangle of it.
+// A texel is written as in a tile index: PackTexel(pixel, turns) with pixel = y * width + x of the unturned
+// exemplar. The exemplar turned by t is a picture of its own, of size TurnedSize(t); a patch is a rectangle
+// of it.
 //
 //   uint32_t a = exemplar.TexelAt(/*turn=*/1, u, v);
 //   uint32_t right_of_a = exemplar.Step(a, GridCut::kRight);   // kNoTexel off the exemplar
@@ -50,7 +51,8 @@ class Exemplar {
   // The texel beside it in a GridCut::Direction. Directions count counter-clockwise, as turns do.
   [[nodiscard]] uint32_t Step(uint32_t texel, int direction) const {
     const int turns = TurnsOfTexel(texel);
-    const uint32_t pixel = beside_[static_cast<size_t>((direction - turns) & 3) * num_pixels() + BtfelOfTexel(texel)];
+    const uint32_t pixel =
+        beside_[static_cast<size_t>((direction - turns) & 3) * num_pixels() + BtfelOfTexel(texel)];
     return pixel == kNoTexel ? kNoTexel : PackTexel(pixel, turns);
   }
 
@@ -63,9 +65,10 @@ class Exemplar {
   }
   [[nodiscard]] float Distance(uint32_t a, uint32_t b) const;
 
-  // Mean and 99.9th percentile of the distance between neighbours: what mismatches are measured in.
+  // What mismatches are measured in: the mean distance of neighbours, and the root mean square distance of
+  // two texels drawn at random.
   [[nodiscard]] double mean_step() const { return mean_step_; }
-  [[nodiscard]] double large_step() const { return large_step_; }
+  [[nodiscard]] double spread() const { return spread_; }
   // Over all texels in all turns, [dims].
   [[nodiscard]] const std::vector<double>& mean() const { return mean_; }
   // Mean squared distance, in the search dimensions, of two texels drawn at random.
@@ -77,7 +80,7 @@ class Exemplar {
   int dims_ = 0;
   int search_dims_ = 0;
   double mean_step_ = 0.0;
-  double large_step_ = 0.0;
+  double spread_ = 0.0;
   double search_spread_ = 0.0;
   std::vector<double> mean_;
   std::vector<float> values_;     // [turn][pixel][dims]

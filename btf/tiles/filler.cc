@@ -13,6 +13,8 @@ namespace {
 
 // A patch leaves the search at least a quarter of the exemplar's shorter side to move in.
 constexpr double kLargestWindowShare = 0.75;
+// First windows, in halves of a feature: small enough that one patch can meet all that is known around it.
+constexpr int kFirstFeatures = 5;
 // Share of a first window that should be known already; below it a place is less wanted.
 constexpr double kWantedOverlap = 0.15;
 constexpr int kCandidates = 24;  // kept by a search
@@ -26,17 +28,18 @@ struct Matching {
   int separation = 0;        // of candidates, in eighths of a feature
   bool must_improve = false;
 };
-constexpr Matching kFirst = {.trials = 4, .repetition = 1.0, .temperature = 0.3, .separation = 4, .must_improve = false};
+constexpr Matching kFirst = {
+    .trials = 4, .repetition = 1.0, .temperature = 0.3, .separation = 4, .must_improve = false};
 constexpr Matching kImprove = {
     .trials = 3, .repetition = 0.1, .temperature = 0.1, .separation = 1, .must_improve = true};
 
 constexpr double kFixedWeight = 2.0;  // of texels that will stay, against free ones
 constexpr double kSeamDoubt = 2.0;    // how fast a texel's weight falls with its mismatch in mean steps
 // Improvements tried for each h x h of free texels; at least and, while thresholds are missed, at most.
-constexpr int kPatchesPerFeature = 3;
+constexpr int kPatchesPerFeature = 5;
 constexpr int kFewestPatches = 24;
-constexpr int kPatience = 4;         // times as many while a threshold is missed
-constexpr int kFruitlessPatches = 12;  // improvements in a row that fail before a good canvas is left alone
+constexpr int kPatience = 4;           // times as many while a threshold is missed
+constexpr int kFruitlessPatches = 24;  // improvements in a row that fail before a good canvas is left alone
 
 int LargestWindow(const Exemplar& exemplar, int feature_size) {
   const int shorter = std::min(exemplar.width(), exemplar.height());
@@ -48,7 +51,9 @@ Window FirstWindow(const Canvas& canvas, int largest, int feature_size) {
   Window window{0, 0, std::min(largest, canvas.width()), std::min(largest, canvas.height())};
   const int lattice = std::max(1, feature_size / 4);
   std::vector<int> sums(static_cast<size_t>(canvas.width() + 1) * (canvas.height() + 1), 0);
-  const auto sum = [&](int x, int y) -> int& { return sums[static_cast<size_t>(y) * (canvas.width() + 1) + x]; };
+  const auto sum = [&](int x, int y) -> int& {
+    return sums[static_cast<size_t>(y) * (canvas.width() + 1) + x];
+  };
   for (int y = 0; y < canvas.height(); ++y) {
     for (int x = 0; x < canvas.width(); ++x) {
       sum(x + 1, y + 1) = sum(x, y + 1) + sum(x + 1, y) - sum(x, y) + (canvas.filled(x, y) ? 0 : 1);
@@ -95,7 +100,8 @@ std::optional<std::array<int, 2>> DrawBadTexel(const Canvas& canvas, Rng& rng) {
     return std::nullopt;
   }
   const auto index = std::upper_bound(sums.begin(), sums.end(), draw) - sums.begin();
-  const int clamped = static_cast<int>(std::min<std::ptrdiff_t>(index, static_cast<std::ptrdiff_t>(sums.size()) - 1));
+  const int clamped =
+      static_cast<int>(std::min<std::ptrdiff_t>(index, static_cast<std::ptrdiff_t>(sums.size()) - 1));
   return std::array<int, 2>{clamped % canvas.width(), clamped / canvas.width()};
 }
 
@@ -116,14 +122,17 @@ void MakeQuery(const Canvas& canvas, const Window& window, SearchQuery& query) {
       const double mismatch = MismatchOfCost(canvas.TexelCost(window.x + x, window.y + y));
       query.weights[index] = static_cast<float>(
           canvas.fixed(window.x + x, window.y + y) ? kFixedWeight : 1.0 / (1.0 + kSeamDoubt * mismatch));
-      std::copy_n(exemplar.Point(texel), dims, query.wanted.begin() + static_cast<std::ptrdiff_t>(index * dims));
+      std::copy_n(exemplar.Point(texel), dims,
+                  query.wanted.begin() + static_cast<std::ptrdiff_t>(index * dims));
     }
   }
 }
 
-// Searches patches for the window, cuts some of the best and keeps the cheapest. Returns how many texels it changed.
-int MatchWindow(const FillParams& params, const Window& window, const Matching& matching, const std::stop_token& stop,
-                Rng& rng, FillerScratch& scratch, Canvas& canvas, FillReport& report) {
+// Searches patches for the window, cuts some of the best and keeps the cheapest. Returns how many texels it
+// changed.
+int MatchWindow(const FillParams& params, const Window& window, const Matching& matching,
+                const std::stop_token& stop, Rng& rng, FillerScratch& scratch, Canvas& canvas,
+                FillReport& report) {
   MakeQuery(canvas, window, scratch.query);
   const int separation = std::max(1, matching.separation * params.feature_size / 8);
   std::vector<Candidate> candidates = scratch.search.Search(
@@ -156,9 +165,10 @@ FillReport MeasureCanvas(const Canvas& canvas, const FillParams& params) {
   const Canvas::Totals totals = canvas.Measure();
   const Exemplar& exemplar = canvas.exemplar();
   if (totals.num_seams > 0) {
-    report.mean_mismatch = MismatchOfCost(static_cast<double>(totals.cost)) / static_cast<double>(totals.num_seams);
+    report.mean_mismatch =
+        MismatchOfCost(static_cast<double>(totals.cost)) / static_cast<double>(totals.num_seams);
   }
-  report.largest_mismatch = MismatchOfCost(totals.largest_cost) * exemplar.mean_step() / exemplar.large_step();
+  report.largest_mismatch = MismatchOfCost(totals.largest_cost) * exemplar.mean_step() / exemplar.spread();
   report.reached = canvas.num_unfilled() == 0 && report.mean_mismatch <= params.mean_threshold &&
                    report.largest_mismatch <= params.texel_threshold;
   return report;
@@ -172,11 +182,13 @@ void Filler::Lay(const Window& window, const Patch& patch, Canvas& canvas, FillR
   PatchCutter::Apply(window, patch, cut, canvas);
 }
 
-absl::Status Filler::Fill(const FillParams& params, const RunContext& context, Canvas& canvas, FillReport& report) {
+absl::Status Filler::Fill(const FillParams& params, const RunContext& context, Canvas& canvas,
+                          FillReport& report) {
   Rng rng(params.seed);
   const int largest = LargestWindow(canvas.exemplar(), params.feature_size);
   while (canvas.num_unfilled() > 0) {
-    const Window window = FirstWindow(canvas, largest, params.feature_size);
+    const int first = std::min(largest, kFirstFeatures * params.feature_size / 2);
+    const Window window = FirstWindow(canvas, first, params.feature_size);
     const int changed = MatchWindow(params, window, kFirst, context.stop, rng, scratch_, canvas, report);
     TESSERA_RETURN_IF_ERROR(context.CheckStop());
     if (changed == 0) {
@@ -204,7 +216,8 @@ absl::Status Filler::Fill(const FillParams& params, const RunContext& context, C
     // 1, 1.5, 2 or 3 features wide and high, centred on the bad texel as far as the canvas allows.
     constexpr std::array<int, 4> kHalfFeatures = {2, 3, 4, 6};
     const int wanted = kHalfFeatures[rng.NextBelow(kHalfFeatures.size())] * params.feature_size / 2;
-    Window window{0, 0, std::min({wanted, largest, canvas.width()}), std::min({wanted, largest, canvas.height()})};
+    Window window{0, 0, std::min({wanted, largest, canvas.width()}),
+                  std::min({wanted, largest, canvas.height()})};
     window.x = std::clamp((*focus)[0] - window.width / 2, 0, canvas.width() - window.width);
     window.y = std::clamp((*focus)[1] - window.height / 2, 0, canvas.height() - window.height);
     const int changed = MatchWindow(params, window, kImprove, context.stop, rng, scratch_, canvas, report);

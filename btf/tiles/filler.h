@@ -1,10 +1,10 @@
-// Fills a canvas with patches of the exemplar by iterated cuts and improves it until its seams are good enough
-// [Kwatra2003], [Leung2007] 3.2 step 2.
+// Fills a canvas with patches of the exemplar by iterated cuts and improves it until its seams are good
+// enough [Kwatra2003], [Leung2007] 3.2 step 2.
 //
-// First windows as large as canvas and exemplar allow are laid where most is still empty and enough is known around;
-// then windows centred on bad seams (drawn in proportion to the square of their cost) are matched again, cut, and kept
-// if the canvas gets cheaper. Old seams take part in every cut (seam_graph.h). An unfilled texel counts as infinitely
-// wrong, so a canvas is never accepted with one.
+// First windows of two and a half features are laid where most is still empty and enough is known around;
+// then windows centred on bad seams (drawn in proportion to the square of their cost) are matched again, cut,
+// and kept if the canvas gets cheaper. Old seams take part in every cut (seam_graph.h). An unfilled texel
+// counts as infinitely wrong, so a canvas is never accepted with one.
 #pragma once
 
 #include <cstdint>
@@ -19,8 +19,8 @@
 namespace tessera {
 
 struct FillParams {
-  std::vector<int> turns;      // that patches may have
-  int feature_size = 16;       // h: windows are one to three of it
+  std::vector<int> turns;  // that patches may have
+  int feature_size = 16;   // h: windows are one to three of it
   uint64_t seed = 1;
   double mean_threshold = 0.0;   // of FillReport.mean_mismatch
   double texel_threshold = 0.0;  // of FillReport.largest_mismatch
@@ -29,7 +29,7 @@ struct FillParams {
 
 struct FillReport {
   double mean_mismatch = 0.0;     // over the seams, in mean steps of the exemplar
-  double largest_mismatch = 0.0;  // of one seam pair, in large steps (99.9th percentile) of the exemplar
+  double largest_mismatch = 0.0;  // of one seam pair, in spreads of the exemplar
   bool reached = false;           // both at most their thresholds
   int64_t num_truncated = 0;      // pairs of kept patches whose table was not submodular
   int num_patches = 0;            // tried
@@ -53,8 +53,8 @@ class Filler {
   // Lays one patch given by the caller: its free texels in `window` are filled or improved.
   void Lay(const Window& window, const Patch& patch, Canvas& canvas, FillReport& report);
 
-  // Fills what is unfilled, then improves. The report tells whether the thresholds were reached; CANCELLED within one
-  // patch search after a stop request. Depends on nothing but its arguments.
+  // Fills what is unfilled, then improves. The report tells whether the thresholds were reached; CANCELLED
+  // within one patch search after a stop request. Depends on nothing but its arguments.
   absl::Status Fill(const FillParams& params, const RunContext& context, Canvas& canvas, FillReport& report);
 
  private:

@@ -4,8 +4,8 @@
 
 namespace tessera {
 
-std::vector<uint32_t> BuildFrame(const Arrangement& arrangement, const TileSides& sides, const Corners& corners,
-                                 std::span<const Strip> strips) {
+std::vector<uint32_t> BuildFrame(const Arrangement& arrangement, const TileSides& sides,
+                                 const Corners& corners, std::span<const Strip> strips) {
   const int height = corners.strip_height;
   const int half = height / 2;
   const int size = strips.front().width;

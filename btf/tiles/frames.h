@@ -11,7 +11,7 @@
 namespace tessera {
 
 // The frame of the tile with these sides, [w][w], kNoTexel in the inside: h / 2 texels deep on every side.
-std::vector<uint32_t> BuildFrame(const Arrangement& arrangement, const TileSides& sides, const Corners& corners,
-                                 std::span<const Strip> strips);
+std::vector<uint32_t> BuildFrame(const Arrangement& arrangement, const TileSides& sides,
+                                 const Corners& corners, std::span<const Strip> strips);
 
 }  // namespace tessera

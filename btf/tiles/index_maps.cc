@@ -19,8 +19,8 @@ constexpr int kSmallestStrip = 8;
 constexpr int kSmallestExemplar = 32;
 // The BTFel number of a packed texel has 30 bits; tiles of 16,384 texels are far beyond any use.
 constexpr int kLargestTile = 16384;
-// Tiles are made in groups; after each, what its tiles used makes the same places dearer for the next. The group is
-// the same for any number of threads, so the result is too.
+// Tiles are made in groups; after each, what its tiles used makes the same places dearer for the next. The
+// group is the same for any number of threads, so the result is too.
 constexpr int kTilesPerGroup = 8;
 
 enum SeedStage : uint64_t { kCornerSeed = 1, kStripSeed = 2, kTileSeed = 3 };
@@ -31,16 +31,16 @@ absl::Status WithReason(absl::Status status, absl::string_view reason) {
 }
 
 absl::Status CheckReached(const FillReport& report, const SynthesisParams& params, absl::string_view what) {
-  if (report.reached) {
+  if (report.reached || params.force) {
     return absl::OkStatus();
   }
-  return WithReason(
-      absl::FailedPreconditionError(absl::StrFormat(
-          "%s: after %d patches the mean mismatch along its seams is %.2f mean steps (limit %.2f), the largest %.2f "
-          "large steps (limit %.2f)",
-          what, report.num_patches, report.mean_mismatch, params.mean_threshold, report.largest_mismatch,
-          params.texel_threshold)),
-      "THRESHOLD_NOT_REACHED");
+  return WithReason(absl::FailedPreconditionError(
+                        absl::StrFormat("%s: after %d patches the mean mismatch along its seams is %.2f mean "
+                                        "steps (limit %.2f), the largest %.2f "
+                                        "times the distance of two texels drawn at random (limit %.2f)",
+                                        what, report.num_patches, report.mean_mismatch, params.mean_threshold,
+                                        report.largest_mismatch, params.texel_threshold)),
+                    "THRESHOLD_NOT_REACHED");
 }
 
 }  // namespace
@@ -52,9 +52,8 @@ absl::Status CheckSizes(int exemplar_width, int exemplar_height, const Synthesis
         absl::StrFormat("strip height %d: must be even and at least %d", height, kSmallestStrip));
   }
   if (params.tile_size < 2 * height || params.tile_size > kLargestTile) {
-    return absl::InvalidArgumentError(
-        absl::StrFormat("tile size %d: must be in [%d, %d] for strips %d high", params.tile_size, 2 * height,
-                        kLargestTile, height));
+    return absl::InvalidArgumentError(absl::StrFormat("tile size %d: must be in [%d, %d] for strips %d high",
+                                                      params.tile_size, 2 * height, kLargestTile, height));
   }
   if (!(params.mean_threshold > 0.0) || !(params.texel_threshold > 0.0)) {
     return absl::InvalidArgumentError(absl::StrFormat("thresholds %g and %g: must be above 0",
@@ -62,10 +61,10 @@ absl::Status CheckSizes(int exemplar_width, int exemplar_height, const Synthesis
   }
   const int needed = std::max(kSmallestExemplar, 2 * height);
   if (exemplar_width < needed || exemplar_height < needed) {
-    return WithReason(
-        absl::InvalidArgumentError(absl::StrFormat("material %dx%d: strips %d high need at least %dx%d texels",
-                                                   exemplar_width, exemplar_height, height, needed, needed)),
-        "MATERIAL_TOO_SMALL");
+    return WithReason(absl::InvalidArgumentError(
+                          absl::StrFormat("material %dx%d: strips %d high need at least %dx%d texels",
+                                          exemplar_width, exemplar_height, height, needed, needed)),
+                      "MATERIAL_TOO_SMALL");
   }
   return absl::OkStatus();
 }
@@ -90,9 +89,8 @@ absl::StatusOr<IndexMaps> SynthesizeIndexMaps(const Exemplar& exemplar, const Ar
   TESSERA_RETURN_IF_ERROR(context.CheckStop());
 
   context.Report("corners", 0, 1, "sets");
-  TESSERA_ASSIGN_OR_RETURN(const Corners corners,
-                           ChooseCorners(spectra, arrangement, params.strip_height,
-                                         Mix64(params.seed, kCornerSeed), context));
+  TESSERA_ASSIGN_OR_RETURN(const Corners corners, ChooseCorners(spectra, arrangement, params.strip_height,
+                                                                Mix64(params.seed, kCornerSeed), context));
   context.Report("corners", 1, 1, "sets");
 
   IndexMaps maps{.tile_size = size,
@@ -130,7 +128,8 @@ absl::StatusOr<IndexMaps> SynthesizeIndexMaps(const Exemplar& exemplar, const Ar
   TESSERA_RETURN_IF_ERROR(context.CheckStop());
   for (int strip = 0; strip < num_strips; ++strip) {
     TESSERA_RETURN_IF_ERROR(statuses[strip]);
-    TESSERA_RETURN_IF_ERROR(CheckReached(maps.strips[strip].report, params, absl::StrFormat("strip %d", strip)));
+    TESSERA_RETURN_IF_ERROR(
+        CheckReached(maps.strips[strip].report, params, absl::StrFormat("strip %d", strip)));
   }
 
   UsageMap usage(exemplar.width(), exemplar.height());
@@ -153,8 +152,9 @@ absl::StatusOr<IndexMaps> SynthesizeIndexMaps(const Exemplar& exemplar, const Ar
     TESSERA_RETURN_IF_ERROR(context.CheckStop());
     for (int tile = group; tile < group_end; ++tile) {
       TESSERA_RETURN_IF_ERROR(statuses[tile]);
-      TESSERA_RETURN_IF_ERROR(CheckReached(maps.tile_reports[tile], params,
-                                           absl::StrFormat("tile %d (code %d)", tile, arrangement.codes[tile])));
+      TESSERA_RETURN_IF_ERROR(
+          CheckReached(maps.tile_reports[tile], params,
+                       absl::StrFormat("tile %d (code %d)", tile, arrangement.codes[tile])));
       usage.Count(std::span(maps.texels).subspan(tile * tile_area, tile_area));
     }
     usage.Finish();

@@ -15,8 +15,8 @@ struct IndexMaps {
   int tile_size = 0;
   std::vector<uint32_t> texels;  // [tiles][w][w], PackTexel(exemplar pixel, turns)
   std::vector<Strip> strips;
-  int64_t corner_cost = 0;  // of all cuts of step 1, in the units of PairCost
-  int64_t corner_seams = 0; // how many cuts those are
+  int64_t corner_cost = 0;   // of all cuts of step 1, in the units of PairCost
+  int64_t corner_seams = 0;  // how many cuts those are
   std::vector<FillReport> tile_reports;
 
   [[nodiscard]] uint32_t texel(int tile, int x, int y) const {
@@ -24,8 +24,9 @@ struct IndexMaps {
   }
 };
 
-// Errors: INVALID_ARGUMENT (sizes; reason MATERIAL_TOO_SMALL when the exemplar is the cause), FAILED_PRECONDITION with
-// reason THRESHOLD_NOT_REACHED naming the worst strip or tile and its figures, CANCELLED. Anisotropy is not looked at.
+// Errors: INVALID_ARGUMENT (sizes; reason MATERIAL_TOO_SMALL when the exemplar is the cause),
+// FAILED_PRECONDITION with reason THRESHOLD_NOT_REACHED naming the worst strip or tile and its figures,
+// CANCELLED. Anisotropy is not looked at.
 absl::StatusOr<IndexMaps> SynthesizeIndexMaps(const Exemplar& exemplar, const Arrangement& arrangement,
                                               const SynthesisParams& params, const RunContext& context);
 

@@ -11,8 +11,8 @@
 
 namespace tessera {
 
-// Fills and improves `texels`, [size][size] with kNoTexel where empty. Frame texels may be replaced, those of the
-// border row not: they must agree with the neighbouring tile. Errors: CANCELLED.
+// Fills and improves `texels`, [size][size] with kNoTexel where empty. Frame texels may be replaced, those of
+// the border row not: they must agree with the neighbouring tile. Errors: CANCELLED.
 absl::Status SynthesizeInterior(const ExemplarSpectra& spectra, int size, const FillParams& params,
                                 const RunContext& context, std::span<uint32_t> texels, FillReport& report);
 

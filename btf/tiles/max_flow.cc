@@ -17,8 +17,8 @@ void GridCut::Reset(int width, int height) {
   nodes_.assign(static_cast<size_t>(stride_) * (height + 2), Node{});
 }
 
-// The residual of the arc that would carry flow between `node` and its neighbour in `direction` if that were its
-// parent: from parent to child in the source tree, from child to parent in the sink tree.
+// The residual of the arc that would carry flow between `node` and its neighbour in `direction` if that were
+// its parent: from parent to child in the source tree, from child to parent in the sink tree.
 template <uint32_t kTree>
 uint32_t GridCut::ArcFromParent(uint32_t node, int direction) const {
   if constexpr (kTree == kSourceTree) {
@@ -46,8 +46,8 @@ int64_t GridCut::Solve() {
       }
     }
   }
-  // The tree with the smaller frontier grows; when one has no frontier left, it can grow no more and its boundary is
-  // saturated.
+  // The tree with the smaller frontier grows; when one has no frontier left, it can grow no more and its
+  // boundary is saturated.
   while (true) {
     const bool source_closed = sides_[kSourceTree].frontier.empty();
     sink_tree_closed_ = sides_[kSinkTree].frontier.empty();
@@ -68,7 +68,8 @@ void GridCut::GrowLevel() {
   Side& side = sides_[kTree];
   side.growing = true;
   side.next.clear();
-  // Nodes relabelled to this level while it is scanned have been scanned before, at a lower one; nothing is appended.
+  // Nodes relabelled to this level while it is scanned have been scanned before, at a lower one; nothing is
+  // appended.
   for (const uint32_t index : side.frontier) {
     int direction = 0;
     while (direction < 4) {
@@ -128,8 +129,7 @@ void GridCut::Push(uint32_t node, int amount) {
       return;
     }
     const uint32_t next = node + offset_[parent];
-    uint16_t& with_flow =
-        kTree == kSourceTree ? nodes_[next].residual[parent ^ 2] : child.residual[parent];
+    uint16_t& with_flow = kTree == kSourceTree ? nodes_[next].residual[parent ^ 2] : child.residual[parent];
     uint16_t& against_flow =
         kTree == kSourceTree ? child.residual[parent] : nodes_[next].residual[parent ^ 2];
     with_flow = static_cast<uint16_t>(with_flow - amount);
@@ -147,7 +147,8 @@ void GridCut::Augment(uint32_t source_node, int direction) {
   int amount = nodes_[source_node].residual[direction];
   amount = Bottleneck<kSourceTree>(source_node, amount);
   amount = Bottleneck<kSinkTree>(sink_node, amount);
-  nodes_[source_node].residual[direction] = static_cast<uint16_t>(nodes_[source_node].residual[direction] - amount);
+  nodes_[source_node].residual[direction] =
+      static_cast<uint16_t>(nodes_[source_node].residual[direction] - amount);
   nodes_[sink_node].residual[direction ^ 2] =
       static_cast<uint16_t>(nodes_[sink_node].residual[direction ^ 2] + amount);
   Push<kSourceTree>(source_node, amount);
@@ -170,7 +171,8 @@ void GridCut::MakeOrphan(uint32_t node) {
   side.highest_orphan = std::max(side.highest_orphan, distance);
 }
 
-// Gives every orphan the parent of lowest distance that it can have, in ascending order of distance, or sets it free.
+// Gives every orphan the parent of lowest distance that it can have, in ascending order of distance, or sets
+// it free.
 template <uint32_t kTree>
 void GridCut::Adopt() {
   Side& side = sides_[kTree];

@@ -8,9 +8,9 @@
 //
 // Integers throughout, so that a cut is exact and the same on every machine. Incremental breadth-first search
 // [Goldberg2011]: two shortest-path trees grow level by level from the terminals; a path that joins them is
-// augmented; nodes cut off by it are adopted at the lowest level that has a residual arc to them, or set free. A node
-// takes 16 bytes. Differs from [Goldberg2011] in that children are found by looking at the four neighbours, not by
-// lists.
+// augmented; nodes cut off by it are adopted at the lowest level that has a residual arc to them, or set
+// free. A node takes 16 bytes. Differs from [Goldberg2011] in that children are found by looking at the four
+// neighbours, not by lists.
 //
 // One GridCut per thread; Reset keeps the memory.
 #pragma once
@@ -111,8 +111,8 @@ class GridCut {
   int64_t flow_ = 0;
   bool sink_tree_closed_ = false;
   std::vector<Node> nodes_;  // with a border of empty nodes
-  // Of the source tree and the sink tree: nodes of the outermost complete level, those of the level being made, its
-  // number, and whether the level beyond is being made.
+  // Of the source tree and the sink tree: nodes of the outermost complete level, those of the level being
+  // made, its number, and whether the level beyond is being made.
   struct Side {
     std::vector<uint32_t> frontier;
     std::vector<uint32_t> next;

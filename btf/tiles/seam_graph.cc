@@ -129,16 +129,16 @@ const PatchCut& PatchCutter::Cut(const Canvas& canvas, const Window& window, con
     }
   }
 
-  // Source side keeps the old texel, sink side takes the new one. `constant` collects what the reduction takes out of
-  // the terminals; the cost before is `before`.
+  // Source side keeps the old texel, sink side takes the new one. `constant` collects what the reduction
+  // takes out of the terminals; the cost before is `before`.
   int64_t constant = 0;
   int64_t before = 0;
   const auto add_unary = [&](int x, int y, int cost_if_new) {
     grid_.AddTerminals(x, y, std::max(0, cost_if_new), std::max(0, -cost_if_new));
     constant += std::min(0, cost_if_new);
   };
-  // Mixed cost of old `from` beside new `to`: mismatch at both, which is the distance there unless an old seam lies
-  // between.
+  // Mixed cost of old `from` beside new `to`: mismatch at both, which is the distance there unless an old
+  // seam lies between.
   const auto mixed = [&](uint32_t old_here, uint32_t old_there, int direction, size_t here, size_t there) {
     const uint32_t continued = exemplar.Step(old_here, direction);
     if (continued == kNoTexel) {
@@ -202,8 +202,8 @@ const PatchCut& PatchCutter::Cut(const Canvas& canvas, const Window& window, con
   for (int y = 0; y < height; ++y) {
     for (int x = 0; x < width; ++x) {
       const size_t index = static_cast<size_t>(y) * width + x;
-      const bool is_new = !grid_.OnSourceSide(x, y) &&
-                          canvas.texel(window.x + x, window.y + y) != new_texels_[index];
+      const bool is_new =
+          !grid_.OnSourceSide(x, y) && canvas.texel(window.x + x, window.y + y) != new_texels_[index];
       cut_.takes_new[index] = is_new ? 1 : 0;
       cut_.num_new += is_new ? 1 : 0;
     }

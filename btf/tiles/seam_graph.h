@@ -1,14 +1,14 @@
 // A picture under synthesis, the cost of its seams, and the cut that lays a patch into it [Kwatra2003].
 //
-// The picture holds, for every texel, which exemplar texel it is. Two neighbours p, q with sources a, b are a seam
-// where b does not continue a. With a' the exemplar texel that continues a at q, and b' the one that continues b at p,
-// the seam costs |a - b'| + |a' - b| in the embedding: the mismatch of the two patches at p and at q. So old seams need
-// no memory of the patches that made them.
+// The picture holds, for every texel, which exemplar texel it is. Two neighbours p, q with sources a, b are a
+// seam where b does not continue a. With a' the exemplar texel that continues a at q, and b' the one that
+// continues b at p, the seam costs |a - b'| + |a' - b| in the embedding: the mismatch of the two patches at p
+// and at q. So old seams need no memory of the patches that made them.
 //
-// Laying a patch chooses old or new for each texel of its window. Each pair is a 2 x 2 table of costs: old/old what
-// the pair costs now, new/new 0, and the two mixed seams; reduced to unary terms and one directed edge
-// [Kolmogorov2004], the grid keeps its four neighbours. Where both continuations exist the table is submodular by the
-// triangle inequality; elsewhere a negative edge is truncated to 0 and counted.
+// Laying a patch chooses old or new for each texel of its window. Each pair is a 2 x 2 table of costs:
+// old/old what the pair costs now, new/new 0, and the two mixed seams; reduced to unary terms and one
+// directed edge [Kolmogorov2004], the grid keeps its four neighbours. Where both continuations exist the
+// table is submodular by the triangle inequality; elsewhere a negative edge is truncated to 0 and counted.
 #pragma once
 
 #include <cstdint>
@@ -57,8 +57,8 @@ class Canvas {
   [[nodiscard]] int TexelCost(int x, int y) const;
 
   struct Totals {
-    int64_t cost = 0;        // over all pairs
-    int64_t num_seams = 0;   // pairs that do not continue each other
+    int64_t cost = 0;       // over all pairs
+    int64_t num_seams = 0;  // pairs that do not continue each other
     int largest_cost = 0;
   };
   // Pairs between two fixed texels are left out: nothing can change them.
@@ -102,8 +102,8 @@ struct PatchCut {
 // Cuts patches into a canvas. Keeps scratch memory: one per thread.
 class PatchCutter {
  public:
-  // The cheapest choice of old and new in the window: fixed texels stay, unfilled ones become new. The patch must lie
-  // inside its turned exemplar and the window inside the canvas.
+  // The cheapest choice of old and new in the window: fixed texels stay, unfilled ones become new. The patch
+  // must lie inside its turned exemplar and the window inside the canvas.
   const PatchCut& Cut(const Canvas& canvas, const Window& window, const Patch& patch);
 
   static void Apply(const Window& window, const Patch& patch, const PatchCut& cut, Canvas& canvas);

@@ -1,10 +1,175 @@
 #include "btf/tiles/synthesize.h"
 
-namespace tessera {
+#include <algorithm>
+#include <string>
+#include <vector>
 
-absl::StatusOr<TileSet> SynthesizeTileSet(const Material&, const Arrangement&, const SynthesisParams&,
-                                          const RunContext&) {
-  return absl::UnimplementedError("tile synthesis");
+#include <absl/strings/cord.h>
+#include <absl/strings/str_cat.h>
+#include <absl/strings/str_format.h>
+
+#include "btf/base/status_macros.h"
+#include "btf/codec/codec.h"
+#include "btf/tiles/anisotropy.h"
+#include "btf/tiles/certificate.h"
+#include "btf/tiles/index_maps.h"
+
+namespace tessera {
+namespace {
+
+double CapturedShare(const Embedding& embedding, int dims) {
+  double captured = 0.0;
+  for (int dim = 0; dim < std::min<int>(dims, static_cast<int>(embedding.variance.size())); ++dim) {
+    captured += embedding.variance[dim];
+  }
+  return embedding.total_variance > 0.0 ? captured / embedding.total_variance : 1.0;
+}
+
+// The table of the BTFels that occur, in ascending exemplar order, and the index of each.
+struct Referenced {
+  BtfelTable table;
+  std::vector<uint32_t> index_of_pixel;  // kNoTexel where unused
+};
+
+Referenced KeepReferenced(const BtfelTable& exemplar, const std::vector<uint32_t>& texels) {
+  Referenced referenced;
+  referenced.index_of_pixel.assign(exemplar.size(), kNoTexel);
+  for (const uint32_t texel : texels) {
+    referenced.index_of_pixel[BtfelOfTexel(texel)] = 0;
+  }
+  BtfelTable& table = referenced.table;
+  table.codec_id = exemplar.codec_id;
+  table.codec_version = exemplar.codec_version;
+  table.num_coefficients = exemplar.num_coefficients;
+  table.offset = exemplar.offset;
+  table.step = exemplar.step;
+  table.tables = exemplar.tables;
+  table.parameters = exemplar.parameters;
+  table.views = exemplar.views;
+  table.lights = exemplar.lights;
+  uint32_t next = 0;
+  for (size_t pixel = 0; pixel < referenced.index_of_pixel.size(); ++pixel) {
+    if (referenced.index_of_pixel[pixel] != kNoTexel) {
+      referenced.index_of_pixel[pixel] = next++;
+      const auto codes = exemplar.btfel(pixel);
+      table.codes.insert(table.codes.end(), codes.begin(), codes.end());
+    }
+  }
+  return referenced;
+}
+
+nlohmann::json DescribeReports(const IndexMaps& maps) {
+  const auto summary = [](const std::vector<const FillReport*>& reports) {
+    double mean = 0.0;
+    double worst_mean = 0.0;
+    double largest = 0.0;
+    int64_t truncated = 0;
+    int64_t patches = 0;
+    int64_t kept = 0;
+    for (const FillReport* const report : reports) {
+      mean += report->mean_mismatch / static_cast<double>(reports.size());
+      worst_mean = std::max(worst_mean, report->mean_mismatch);
+      largest = std::max(largest, report->largest_mismatch);
+      truncated += report->num_truncated;
+      patches += report->num_patches;
+      kept += report->num_kept;
+    }
+    return nlohmann::json{{"mean_mismatch", mean},       {"worst_mean_mismatch", worst_mean},
+                          {"largest_mismatch", largest}, {"truncated_pairs", truncated},
+                          {"patches_tried", patches},    {"patches_kept", kept}};
+  };
+  std::vector<const FillReport*> strips;
+  std::vector<const FillReport*> tiles;
+  for (const Strip& strip : maps.strips) {
+    strips.push_back(&strip.report);
+  }
+  for (const FillReport& report : maps.tile_reports) {
+    tiles.push_back(&report);
+  }
+  std::vector<const FillReport*> all = strips;
+  all.insert(all.end(), tiles.begin(), tiles.end());
+  const bool reached =
+      std::all_of(all.begin(), all.end(), [](const FillReport* report) { return report->reached; });
+  return {{"strips", summary(strips)}, {"tiles", summary(tiles)}, {"thresholds_reached", reached}};
+}
+
+}  // namespace
+
+absl::StatusOr<TileSet> SynthesizeTileSet(const Material& material, const Arrangement& arrangement,
+                                          const SynthesisParams& params, const RunContext& context) {
+  TESSERA_RETURN_IF_ERROR(CheckSizes(material.width, material.height, params));
+  const size_t num_pixels = static_cast<size_t>(material.width) * material.height;
+  if (material.btfels.size() != num_pixels) {
+    return absl::InvalidArgumentError(absl::StrFormat(
+        "material: %d BTFels for %dx%d texels", material.btfels.size(), material.width, material.height));
+  }
+  if (num_pixels > BtfelOfTexel(kNoTexel)) {
+    return absl::InvalidArgumentError(
+        absl::StrFormat("material %dx%d: more than 2^30 texels", material.width, material.height));
+  }
+  const Codec* const codec = FindCodec(material.btfels.codec_id);
+  if (codec == nullptr) {
+    return absl::InvalidArgumentError(absl::StrCat("unknown codec '", material.btfels.codec_id, "'"));
+  }
+  context.Report("embedding", 0, 1, "sets");
+  TESSERA_ASSIGN_OR_RETURN(const Embedding embedding, codec->Embed(material, kCutDims, context));
+  context.Report("embedding", 1, 1, "sets");
+  const Exemplar exemplar(embedding);
+  const Anisotropy anisotropy = MeasureAnisotropy(exemplar, context);
+  TESSERA_RETURN_IF_ERROR(context.CheckStop());
+  if (arrangement.turned_strips && anisotropy.figure() > kAnisotropyLimit && !params.force) {
+    absl::Status status = absl::FailedPreconditionError(absl::StrFormat(
+        "material is not isotropic: anisotropy %.2f (pattern %.2f, mean reflectance %.2f), limit %.2f for "
+        "'%s', whose "
+        "strips are turned",
+        anisotropy.figure(), anisotropy.pattern, anisotropy.mean, kAnisotropyLimit, arrangement.id));
+    status.SetPayload(kReasonPayload, absl::Cord("NOT_ISOTROPIC"));
+    return status;
+  }
+
+  TESSERA_ASSIGN_OR_RETURN(const IndexMaps maps, SynthesizeIndexMaps(exemplar, arrangement, params, context));
+
+  TileSet set;
+  set.arrangement_id = arrangement.id;
+  set.arrangement_sha256 = arrangement.sha256;
+  set.tile_size = params.tile_size;
+  set.strip_height = params.strip_height;
+  set.tile_codes = arrangement.codes;
+  set.provenance = material.provenance;
+  set.radiometry = material.radiometry;
+  Referenced referenced = KeepReferenced(material.btfels, maps.texels);
+  set.btfels = std::move(referenced.table);
+  set.tile_index.reserve(maps.texels.size());
+  for (const uint32_t texel : maps.texels) {
+    set.tile_index.push_back(PackTexel(referenced.index_of_pixel[BtfelOfTexel(texel)], TurnsOfTexel(texel)));
+  }
+
+  context.Report("certificate", 0, 1, "sets");
+  TESSERA_ASSIGN_OR_RETURN(set.certificate, CertifyTiles(material, exemplar, arrangement, maps, context));
+  context.Report("certificate", 1, 1, "sets");
+
+  set.metadata = DescribeReports(maps);
+  set.metadata["seed"] = params.seed;
+  set.metadata["parameters"] = {{"tile_size", params.tile_size},
+                                {"strip_height", params.strip_height},
+                                {"mean_threshold", params.mean_threshold},
+                                {"texel_threshold", params.texel_threshold},
+                                {"force", params.force}};
+  set.metadata["exemplar"] = {{"width", material.width}, {"height", material.height}};
+  set.metadata["referenced_share"] = static_cast<double>(set.btfels.size()) / static_cast<double>(num_pixels);
+  set.metadata["captured_variance"] = {{"search_dims", exemplar.search_dims()},
+                                       {"search_share", CapturedShare(embedding, kSearchDims)},
+                                       {"cut_dims", std::min(embedding.dims, kCutDims)},
+                                       {"cut_share", CapturedShare(embedding, kCutDims)}};
+  set.metadata["anisotropy"] = {{"figure", anisotropy.figure()},
+                                {"pattern", anisotropy.pattern},
+                                {"mean", anisotropy.mean},
+                                {"limit", kAnisotropyLimit}};
+  set.metadata["corners"] = {
+      {"mean_mismatch",
+       MismatchOfCost(static_cast<double>(maps.corner_cost)) /
+           static_cast<double>(std::max<int64_t>(1, maps.corner_seams) * params.strip_height / 2)}};
+  return set;
 }
 
 }  // namespace tessera

@@ -21,11 +21,14 @@ struct SynthesisParams {
   int tile_size = 64;     // w, texels, at least 2 h
   int strip_height = 16;  // h, texels, even, at least 8: about the size of a feature
   uint64_t seed = 1;
-  bool force = false;  // synthesise turned strips of an anisotropic material all the same
-  // A filled strip or tile must reach both. Units: kMeanStep, the material's mean embedding distance of
-  // neighbouring texels, and its 99.9th percentile.
-  double mean_threshold = 2.0;   // mean mismatch along cuts / mean step
-  double texel_threshold = 2.0;  // largest mismatch of one cut pair / 99.9th percentile of steps
+  // Synthesise turned strips of an anisotropic material all the same, and keep strips and tiles that miss a
+  // threshold: metadata.thresholds_reached tells.
+  bool force = false;
+  // A filled strip or tile must reach both. In units of the material's mean embedding distance of
+  // neighbouring texels:
+  double mean_threshold = 3.0;  // mean mismatch along cuts
+  // In units of the root mean square distance of two texels drawn at random:
+  double texel_threshold = 2.0;  // largest mismatch of one cut pair
 };
 
 // The payload of a refused or failed synthesis: a stable word beside the sentence, one of
@@ -39,8 +42,8 @@ inline constexpr char kReasonPayload[] = "tessera.reason";
 //
 // Errors: INVALID_ARGUMENT naming the size and its limit (reason MATERIAL_TOO_SMALL when the exemplar is the
 // cause) or an unknown codec; FAILED_PRECONDITION with reason NOT_ISOTROPIC (turned strips only, unless
-// forced) or THRESHOLD_NOT_REACHED, each with its figures; CANCELLED within one patch search. Progress:
-// stages "corners", "strips" and "tiles".
+// forced) or THRESHOLD_NOT_REACHED (unless forced), each with its figures; CANCELLED within one patch search.
+// Progress: stages "corners", "strips" and "tiles".
 [[nodiscard]] absl::StatusOr<TileSet> SynthesizeTileSet(const Material& material,
                                                         const Arrangement& arrangement,
                                                         const SynthesisParams& params,

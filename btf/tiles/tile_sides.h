@@ -33,7 +33,8 @@ StripTexel StripTexelAt(int side, Sign sign, int along, int depth, int tile_size
 // Column and row of a tile at (along, depth) of a side.
 std::array<int, 2> TilePixelAt(int side, int along, int depth, int tile_size);
 
-// The strips of an arrangement, numbered: by colour in surface-*; horizontal colours, then vertical ones, in plane-*.
+// The strips of an arrangement, numbered: by colour in surface-*; horizontal colours, then vertical ones, in
+// plane-*.
 int NumStrips(const Arrangement& arrangement);
 int StripOfSide(const Arrangement& arrangement, int side, int colour);
 // Turns that the texels of a strip may have, in the strip's own frame.
@@ -51,8 +52,8 @@ struct CornerSide {
   friend bool operator==(const CornerSide&, const CornerSide&) = default;
 };
 
-// Two sides that meet at the corner of some tile: `in` ends there, `out` starts there (counter-clockwise). The end of
-// the strip that lies there: '+' sides end with the strip's end, '-' sides with its start.
+// Two sides that meet at the corner of some tile: `in` ends there, `out` starts there (counter-clockwise).
+// The end of the strip that lies there: '+' sides end with the strip's end, '-' sides with its start.
 struct CornerPair {
   CornerSide in;
   CornerSide out;

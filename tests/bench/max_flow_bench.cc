@@ -1,6 +1,7 @@
-// Minimum cuts of left-to-right seam graphs: GridCut against Boost.Graph's Boykov-Kolmogorov [Boykov2004] on a
-// compressed sparse row graph with integer capacities. Each side's time includes building its graph from the same
-// arrays. Prints `name,value,unit,limit,verdict`; exits 1 when a limit is missed or two cuts disagree.
+// Minimum cuts of left-to-right seam graphs: GridCut against Boost.Graph's Boykov-Kolmogorov [Boykov2004] on
+// a compressed sparse row graph with integer capacities. Each side's time includes building its graph from
+// the same arrays. Prints `name,value,unit,limit,verdict`; exits 1 when a limit is missed or two cuts
+// disagree.
 #include <algorithm>
 #include <array>
 #include <chrono>
@@ -100,7 +101,8 @@ int64_t SolveWithBoost(const SeamGraph& graph) {
   const int count = n * n;
   const int source = count;
   const int sink = count + 1;
-  // Arcs by tail: right, up, left, down, terminal; then those of source and sink. arc[v][d] is the arc's number.
+  // Arcs by tail: right, up, left, down, terminal; then those of source and sink. arc[v][d] is the arc's
+  // number.
   std::vector<std::pair<int, int>> arcs;
   std::vector<int> capacity;
   std::vector<std::array<int, 5>> arc(count);

@@ -1,0 +1,220 @@
+#include "btf/tiles/index_maps.h"
+
+#include <algorithm>
+#include <array>
+#include <string>
+#include <vector>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "btf/tiles/frames.h"
+#include "btf/tiles/tile_sides.h"
+#include "tests/btf/tiles/noise_exemplar.h"
+
+namespace tessera {
+namespace {
+
+using testing::HasSubstr;
+
+SynthesisParams SmallParams() {
+  SynthesisParams params;
+  params.tile_size = 16;
+  params.strip_height = 8;
+  params.mean_threshold = 10.0;
+  params.texel_threshold = 10.0;
+  return params;
+}
+
+IndexMaps Synthesize(const Exemplar& exemplar, const char* arrangement, const SynthesisParams& params,
+                     int num_threads) {
+  RunContext context;
+  context.num_threads = num_threads;
+  absl::StatusOr<IndexMaps> maps =
+      SynthesizeIndexMaps(exemplar, **FindArrangement(arrangement), params, context);
+  EXPECT_TRUE(maps.ok()) << maps.status();
+  return *std::move(maps);
+}
+
+// A tile as a picture, turned as numpy.rot90 does: texels move and take the turns on.
+std::vector<uint32_t> TurnedTile(const IndexMaps& maps, int tile, int turns) {
+  const int size = maps.tile_size;
+  std::vector<uint32_t> picture(static_cast<size_t>(size) * size);
+  for (int y = 0; y < size; ++y) {
+    for (int x = 0; x < size; ++x) {
+      picture[y * size + x] = maps.texel(tile, x, y);
+    }
+  }
+  for (int i = 0; i < (turns & 3); ++i) {
+    std::vector<uint32_t> turned(picture.size());
+    for (int y = 0; y < size; ++y) {
+      for (int x = 0; x < size; ++x) {
+        turned[(size - 1 - x) * size + y] = TurnTexel(picture[y * size + x], 1);
+      }
+    }
+    picture.swap(turned);
+  }
+  return picture;
+}
+
+// Lays '+' side k of A on top of '-' side j of B, turned so that the shared side lies level with A above it,
+// and compares the two rows with the strip's two centre rows, texel by texel and turn by turn. In plane-* A
+// then stands turned by -k: the vertical strips' own frame.
+void CheckPair(const IndexMaps& maps, int strip, int a, int k, int b, int j) {
+  const int size = maps.tile_size;
+  const int height = maps.strips[strip].height;
+  const std::vector<uint32_t> above = TurnedTile(maps, a, 4 - k);      // side k to the south
+  const std::vector<uint32_t> below = TurnedTile(maps, b, 4 + 2 - j);  // side j to the north
+  for (int x = 1; x + 1 < size; ++x) {
+    const uint32_t upper = above[(size - 1) * size + x];
+    const uint32_t lower = below[x];
+    ASSERT_EQ(upper, maps.strips[strip].texel(x, height / 2 - 1))
+        << "tile " << a << " side " << k << " texel " << x;
+    ASSERT_EQ(lower, maps.strips[strip].texel(x, height / 2))
+        << "tile " << b << " side " << j << " texel " << x;
+  }
+}
+
+int CheckAllPairs(const IndexMaps& maps, const Arrangement& arrangement) {
+  int num_pairs = 0;
+  const int num_tiles = static_cast<int>(arrangement.codes.size());
+  for (int a = 0; a < num_tiles; ++a) {
+    const TileSides sides_a = SidesFromTileCode(arrangement.codes[a]);
+    for (int b = 0; b < num_tiles; ++b) {
+      const TileSides sides_b = SidesFromTileCode(arrangement.codes[b]);
+      for (int k = 0; k < 4; ++k) {
+        for (int j = 0; j < 4; ++j) {
+          const bool opposite = sides_a[k].sign == Sign::kPlus && sides_b[j].sign == Sign::kMinus;
+          const bool may_face = arrangement.turned_strips || (j - k + 4) % 4 == 2;
+          if (opposite && may_face && sides_a[k].colour == sides_b[j].colour) {
+            CheckPair(maps, StripOfSide(arrangement, k, sides_a[k].colour), a, k, b, j);
+            ++num_pairs;
+          }
+        }
+      }
+    }
+  }
+  return num_pairs;
+}
+
+TEST(IndexMapsTest, EveryLegalPairOfSurface96AgreesOnTheSharedStrip) {
+  const Exemplar exemplar(BumpyEmbedding(40, 36, 1));
+  const IndexMaps maps = Synthesize(exemplar, "surface-96", SmallParams(), 0);
+  EXPECT_EQ(CheckAllPairs(maps, **FindArrangement("surface-96")), 2 * 96 * 96);
+}
+
+TEST(IndexMapsTest, EveryLegalPairOfPlane16AgreesAndNothingIsTurned) {
+  const Exemplar exemplar(BumpyEmbedding(36, 40, 2));
+  const IndexMaps maps = Synthesize(exemplar, "plane-16", SmallParams(), 0);
+  EXPECT_EQ(CheckAllPairs(maps, **FindArrangement("plane-16")), 2 * 2 * 8 * 8);
+  for (const uint32_t texel : maps.texels) {
+    ASSERT_EQ(TurnsOfTexel(texel), 0);
+  }
+  // The vertical strips stand upright: east takes the left half, west the right half of the same h x w
+  // picture.
+  const Arrangement& arrangement = **FindArrangement("plane-16");
+  const Strip& strip = maps.strips[2];  // vertical, colour 0
+  for (int tile = 0; tile < 16; ++tile) {
+    const TileSides sides = SidesFromTileCode(arrangement.codes[tile]);
+    for (int y = 1; y + 1 < 16; ++y) {
+      // Upright picture: column c, row r is the lying strip at x = w - 1 - r, y = c.
+      if (sides[1].colour == 0) {
+        EXPECT_EQ(maps.texel(tile, 15, y), TurnTexel(strip.texel(15 - y, 3), 1));
+      }
+      if (sides[3].colour == 0) {
+        EXPECT_EQ(maps.texel(tile, 0, y), TurnTexel(strip.texel(15 - y, 4), 1));
+      }
+    }
+  }
+}
+
+TEST(IndexMapsTest, CornerTexelsBelongToTheSideThatStartsThere) {
+  const Exemplar exemplar(BumpyEmbedding(40, 40, 3));
+  const IndexMaps maps = Synthesize(exemplar, "surface-96", SmallParams(), 0);
+  const Arrangement& arrangement = **FindArrangement("surface-96");
+  for (int tile = 0; tile < 96; ++tile) {
+    const TileSides sides = SidesFromTileCode(arrangement.codes[tile]);
+    for (int side = 0; side < 4; ++side) {
+      const auto [x, y] = TilePixelAt(side, 0, 0, 16);
+      const StripTexel at = StripTexelAt(side, sides[side].sign, 0, 0, 16, 8);
+      EXPECT_EQ(maps.texel(tile, x, y),
+                TurnTexel(maps.strips[sides[side].colour].texel(at.x, at.y), at.turns));
+    }
+  }
+}
+
+TEST(IndexMapsTest, SameSeedGivesTheSameTilesForAnyNumberOfThreads) {
+  const Exemplar exemplar(BumpyEmbedding(32, 32, 4));
+  SynthesisParams params = SmallParams();
+  params.seed = 7;
+  const IndexMaps one = Synthesize(exemplar, "surface-96", params, 1);
+  EXPECT_EQ(one.texels, Synthesize(exemplar, "surface-96", params, 2).texels);
+  EXPECT_EQ(one.texels, Synthesize(exemplar, "surface-96", params, 8).texels);
+  params.seed = 8;
+  EXPECT_NE(one.texels, Synthesize(exemplar, "surface-96", params, 2).texels);
+}
+
+TEST(IndexMapsTest, TakesAnyEvenStripAndAnyTileOfTwiceIt) {
+  const Exemplar exemplar(BumpyEmbedding(32, 48, 5));
+  for (const auto& [tile, strip] : std::vector<std::array<int, 2>>{{16, 8}, {23, 10}, {33, 16}, {70, 8}}) {
+    SynthesisParams params = SmallParams();
+    params.tile_size = tile;
+    params.strip_height = strip;
+    const IndexMaps maps = Synthesize(exemplar, "plane-16", params, 0);
+    EXPECT_EQ(CheckAllPairs(maps, **FindArrangement("plane-16")), 256) << tile << " " << strip;
+    EXPECT_EQ(std::count(maps.texels.begin(), maps.texels.end(), kNoTexel), 0);
+  }
+}
+
+TEST(IndexMapsTest, RefusesSizesNamingTheLimit) {
+  SynthesisParams params = SmallParams();
+  params.strip_height = 7;
+  EXPECT_THAT(CheckSizes(64, 64, params).message(), HasSubstr("strip height 7"));
+  params.strip_height = 6;
+  EXPECT_THAT(CheckSizes(64, 64, params).message(), HasSubstr("at least 8"));
+  params.strip_height = 10;
+  EXPECT_THAT(CheckSizes(64, 64, params).message(), HasSubstr("tile size 16: must be in [20"));
+  params = SmallParams();
+  const absl::Status small = CheckSizes(64, 31, params);
+  EXPECT_THAT(small.message(), HasSubstr("64x31"));
+  EXPECT_EQ(small.GetPayload(kReasonPayload), "MATERIAL_TOO_SMALL");
+  params = {.tile_size = 128, .strip_height = 40};
+  EXPECT_THAT(CheckSizes(79, 128, params).message(), HasSubstr("at least 80x80"));
+  EXPECT_TRUE(CheckSizes(80, 80, params).ok());
+}
+
+TEST(IndexMapsTest, SaysWhichStripMissedItsThresholdAndByHowMuch) {
+  const Exemplar exemplar(BumpyEmbedding(32, 32, 6));
+  SynthesisParams params = SmallParams();
+  params.mean_threshold = 1e-3;
+  const absl::StatusOr<IndexMaps> maps =
+      SynthesizeIndexMaps(exemplar, **FindArrangement("plane-16"), params, RunContext{});
+  ASSERT_EQ(maps.status().code(), absl::StatusCode::kFailedPrecondition);
+  EXPECT_EQ(maps.status().GetPayload(kReasonPayload), "THRESHOLD_NOT_REACHED");
+  EXPECT_THAT(std::string(maps.status().message()), HasSubstr("strip 0"));
+  EXPECT_THAT(std::string(maps.status().message()), HasSubstr("limit 0.00"));
+}
+
+TEST(IndexMapsTest, StopsWhenAsked) {
+  const Exemplar exemplar(BumpyEmbedding(32, 32, 7));
+  for (const std::string_view stage : {"corners", "strips", "tiles"}) {
+    std::stop_source stop;
+    RunContext context;
+    context.stop = stop.get_token();
+    int after = 0;
+    context.progress = [&](const Progress& progress) {
+      after += stop.stop_requested() ? 1 : 0;
+      if (progress.stage == stage) {
+        stop.request_stop();
+      }
+    };
+    EXPECT_EQ(SynthesizeIndexMaps(exemplar, **FindArrangement("surface-96"), SmallParams(), context)
+                  .status()
+                  .code(),
+              absl::StatusCode::kCancelled);
+    EXPECT_LE(after, 8) << "only what was under way is finished";
+  }
+}
+
+}  // namespace
+}  // namespace tessera

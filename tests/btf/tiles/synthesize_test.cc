@@ -1,0 +1,167 @@
+#include "btf/tiles/synthesize.h"
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+#include <vector>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "btf/codec/codec.h"
+#include "btf/data/direction_sets.h"
+#include "btf/data/memory_btf.h"
+#include "btf/tiles/anisotropy.h"
+#include "tests/btf/tiles/noise_exemplar.h"
+
+namespace tessera {
+namespace {
+
+using testing::HasSubstr;
+
+enum class Pattern { kBumps, kStripes };
+
+// A diffuse surface of bumps or of stripes along x, lit and seen from a few directions.
+Material MakeMaterial(int width, int height, Pattern pattern) {
+  const std::vector<double> noise = SmoothNoise(width, height, 2, 11);
+  BtfInfo info{.width = width,
+               .height = height,
+               .views = *DirectionSet("3x4"),
+               .lights = *DirectionSet("3x4"),
+               .provenance = {.source = "made up", .licence = "CC0", .citation = ""},
+               .radiometry = "reflectance"};
+  std::vector<float> samples;
+  const auto at = [&](int x, int y) {
+    x = (x + width) % width;
+    y = (y + height) % height;
+    return pattern == Pattern::kBumps ? noise[static_cast<size_t>(y) * width + x] : 0.4 * std::sin(1.3 * y);
+  };
+  for (int y = 0; y < height; ++y) {
+    for (int x = 0; x < width; ++x) {
+      const Eigen::Vector3d normal =
+          Eigen::Vector3d(at(x - 1, y) - at(x + 1, y), at(x, y + 1) - at(x, y - 1), 1.0).normalized();
+      for (int channel = 0; channel < 3; ++channel) {
+        const double albedo = 0.4 + 0.2 * at(x, y) + 0.05 * channel;
+        for (size_t view = 0; view < info.views.size(); ++view) {
+          for (const Direction& light : info.lights) {
+            samples.push_back(
+                static_cast<float>(albedo * std::max(0.0, normal.dot(VectorFromDirection(light)))));
+          }
+        }
+      }
+    }
+  }
+  const auto source = MemoryBtf::Create(info, samples);
+  EXPECT_TRUE(source.ok()) << source.status();
+  absl::StatusOr<Material> material =
+      FindCodec("dsh-cls")->Encode(**source, {.kl = 9, .kv = 1}, RunContext{});
+  EXPECT_TRUE(material.ok()) << material.status();
+  return *std::move(material);
+}
+
+SynthesisParams SmallParams() {
+  SynthesisParams params;
+  params.tile_size = 16;
+  params.strip_height = 8;
+  return params;
+}
+
+TEST(SynthesizeTileSetTest, EveryTexelIsABtfelOfTheMaterial) {
+  const Material material = MakeMaterial(40, 36, Pattern::kBumps);
+  const Arrangement& arrangement = **FindArrangement("surface-96");
+  const absl::StatusOr<TileSet> set = SynthesizeTileSet(material, arrangement, SmallParams(), RunContext{});
+  ASSERT_TRUE(set.ok()) << set.status();
+  EXPECT_EQ(set->arrangement_id, "surface-96");
+  EXPECT_EQ(set->arrangement_sha256, arrangement.sha256);
+  EXPECT_EQ(set->tile_codes, arrangement.codes);
+  EXPECT_EQ(set->tile_index.size(), 96u * 16 * 16);
+  EXPECT_EQ(set->provenance.source, "made up");
+  EXPECT_EQ(set->radiometry, material.radiometry);
+  EXPECT_EQ(set->btfels.tables.size(), material.btfels.tables.size());
+
+  // Each referenced once, in ascending exemplar order.
+  std::vector<bool> referenced(set->btfels.size(), false);
+  for (const uint32_t texel : set->tile_index) {
+    ASSERT_LT(BtfelOfTexel(texel), set->btfels.size());
+    referenced[BtfelOfTexel(texel)] = true;
+  }
+  EXPECT_TRUE(std::all_of(referenced.begin(), referenced.end(), [](bool used) { return used; }));
+  size_t pixel = 0;
+  for (size_t i = 0; i < set->btfels.size(); ++i) {
+    const auto wanted = set->btfels.btfel(i);
+    while (pixel < material.btfels.size() &&
+           !std::equal(wanted.begin(), wanted.end(), material.btfels.btfel(pixel).begin())) {
+      ++pixel;
+    }
+    ASSERT_LT(pixel, material.btfels.size())
+        << "BTFel " << i << " is not in the material after its predecessor";
+    ++pixel;
+  }
+
+  EXPECT_EQ(set->metadata["seed"], 1);
+  EXPECT_EQ(set->metadata["parameters"]["tile_size"], 16);
+  EXPECT_DOUBLE_EQ(set->metadata["referenced_share"].get<double>(), set->btfels.size() / 1440.0);
+  EXPECT_GT(set->metadata["captured_variance"]["search_share"].get<double>(), 0.5);
+  EXPECT_LE(set->metadata["captured_variance"]["cut_share"].get<double>(), 1.0 + 1e-9);
+  EXPECT_LE(set->metadata["anisotropy"]["figure"].get<double>(), kAnisotropyLimit);
+  EXPECT_LE(set->metadata["tiles"]["worst_mean_mismatch"].get<double>(), SmallParams().mean_threshold);
+  EXPECT_EQ(set->certificate["images"].size(), 16u);
+  EXPECT_GT(set->certificate["insides"]["ratio"].get<double>(), 0.0);
+  EXPECT_GT(set->certificate["borders"]["verbatim_share"].get<double>(), 0.0);
+}
+
+TEST(SynthesizeTileSetTest, RefusesToTurnStripesUnlessForced) {
+  const Material material = MakeMaterial(32, 32, Pattern::kStripes);
+  const Arrangement& surface = **FindArrangement("surface-96");
+  SynthesisParams params = SmallParams();
+  params.mean_threshold = params.texel_threshold = 100.0;
+  const absl::StatusOr<TileSet> refused = SynthesizeTileSet(material, surface, params, RunContext{});
+  ASSERT_EQ(refused.status().code(), absl::StatusCode::kFailedPrecondition);
+  EXPECT_EQ(refused.status().GetPayload(kReasonPayload), "NOT_ISOTROPIC");
+  EXPECT_THAT(std::string(refused.status().message()), HasSubstr("limit"));
+  EXPECT_TRUE(SynthesizeTileSet(material, **FindArrangement("plane-16"), params, RunContext{}).ok());
+  params.force = true;
+  EXPECT_TRUE(SynthesizeTileSet(material, surface, params, RunContext{}).ok());
+}
+
+TEST(SynthesizeTileSetTest, RefusesWhatIsNotAMaterial) {
+  Material material = MakeMaterial(32, 32, Pattern::kBumps);
+  material.height = 33;
+  EXPECT_EQ(
+      SynthesizeTileSet(material, **FindArrangement("plane-16"), SmallParams(), RunContext{}).status().code(),
+      absl::StatusCode::kInvalidArgument);
+  material.height = 32;
+  material.btfels.codec_id = "nonesuch";
+  EXPECT_THAT(
+      std::string(SynthesizeTileSet(material, **FindArrangement("plane-16"), SmallParams(), RunContext{})
+                      .status()
+                      .message()),
+      HasSubstr("nonesuch"));
+}
+
+TEST(AnisotropyTest, TellsBumpsFromStripesAndFromATurningMean) {
+  const Embedding bumps = BumpyEmbedding(96, 96, 3);
+  const Anisotropy isotropic = MeasureAnisotropy(Exemplar(bumps), RunContext{});
+  EXPECT_LT(isotropic.figure(), 0.75 * kAnisotropyLimit);
+  EXPECT_NEAR(isotropic.mean, 0.0, 0.05);
+
+  Embedding stripes = bumps;
+  for (int turn = 0; turn < 4; ++turn) {
+    for (int i = 0; i < 96 * 96; ++i) {
+      stripes.values[(static_cast<size_t>(turn) * 96 * 96 + i) * 3] =
+          static_cast<float>(3.0 * std::sin(0.8 * (i / 96)));
+    }
+  }
+  EXPECT_GT(MeasureAnisotropy(Exemplar(stripes), RunContext{}).pattern, kAnisotropyLimit);
+
+  Embedding brushed = bumps;  // the mean leans along x, so it turns with the picture
+  for (int turn = 0; turn < 4; ++turn) {
+    for (int i = 0; i < 96 * 96; ++i) {
+      brushed.values[(static_cast<size_t>(turn) * 96 * 96 + i) * 3] += turn % 2 == 0 ? 2.0f : -2.0f;
+    }
+  }
+  EXPECT_GT(MeasureAnisotropy(Exemplar(brushed), RunContext{}).mean, kAnisotropyLimit);
+}
+
+}  // namespace
+}  // namespace tessera
