@@ -31,7 +31,7 @@ void JobEvents::Tell(int64_t id, const v1::Job& job, uint64_t sequence) const {
 void JobEvents::BeginRun(const JobRecord& record) {
   {
     const std::lock_guard lock(mutex_);
-    runs_[record.id] = {record.job, record.sequence, {}};
+    runs_[record.id] = Run{.job = record.job, .sequence = record.sequence};
   }
   Tell(record.id, record.job, record.sequence);
 }
@@ -43,7 +43,7 @@ void JobEvents::Report(int64_t id, const Progress& progress) {
   {
     const std::lock_guard lock(mutex_);
     const auto it = runs_.find(id);
-    if (it == runs_.end()) {
+    if (it == runs_.end() || it->second.ending) {
       return;
     }
     Run& run = it->second;
@@ -67,7 +67,11 @@ void JobEvents::Report(int64_t id, const Progress& progress) {
 uint64_t JobEvents::NextSequence(int64_t id) {
   const std::lock_guard lock(mutex_);
   const auto it = runs_.find(id);
-  return it == runs_.end() ? 0 : ++it->second.sequence;
+  if (it == runs_.end()) {
+    return 0;
+  }
+  it->second.ending = true;
+  return it->second.sequence + 1;
 }
 
 void JobEvents::EndRun(const JobRecord& record) {

@@ -28,7 +28,8 @@ class JobEvents {
   void BeginRun(const JobRecord& record);
   // Tells progress, at most every 100 ms unless the stage changes or ends. Ignored for jobs that do not run.
   void Report(int64_t id, const Progress& progress);
-  // The number for the event that ends a run; larger than all before.
+  // The number for the event that ends the run: larger than all that were told, and from now on progress is
+  // not, so that nobody takes another event for this one.
   [[nodiscard]] uint64_t NextSequence(int64_t id);
   // The run has ended with this record, as the catalog has it.
   void EndRun(const JobRecord& record);
@@ -48,6 +49,7 @@ class JobEvents {
     v1::Job job;
     uint64_t sequence = 0;
     std::chrono::steady_clock::time_point told;
+    bool ending = false;
   };
   struct Watched {
     int64_t id = 0;
