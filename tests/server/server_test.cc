@@ -3,6 +3,9 @@
 
 #include <atomic>
 #include <chrono>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
 #include <span>
 #include <thread>
 
@@ -18,6 +21,7 @@
 #include "tests/server/support/open_catalog.h"
 #include "tests/server/support/stubs.h"
 #include "tests/server/support/temporary_folder.h"
+#include "tests/support/btf_files.h"
 
 namespace tessera {
 namespace {
@@ -124,12 +128,19 @@ TEST_F(ServerTest, AnUploadThatBreaksOffKeepsWhatCameThrough) {
       chunk.set_data(bytes.substr(offset, 1 << 20));
       ASSERT_TRUE(writer->Write(chunk));
     }
-    std::this_thread::sleep_for(milliseconds(100));
+    const auto uploading = folder_.path() / "uploads" / DigestOf(bytes);
+    for (int i = 0; i < 4000; ++i) {  // until something came through
+      std::error_code error;
+      if (std::filesystem::file_size(uploading, error) > 0 && !error) {
+        break;
+      }
+      std::this_thread::sleep_for(milliseconds(5));
+    }
     context.TryCancel();
     EXPECT_FALSE(writer->Finish().ok());
   }
   uint64_t committed = 0;
-  for (int i = 0; i < 200 && committed == 0; ++i) {  // the server notices the break a moment later
+  for (int i = 0; i < 2000 && committed == 0; ++i) {  // the server notices the break a moment later
     std::this_thread::sleep_for(milliseconds(10));
     committed = stubs_->BeginUpload(bytes)->committed_bytes();
   }
@@ -283,6 +294,47 @@ TEST_F(ServerTest, AnArchiveThatIsNoneFailsItsJobWithoutShowingPaths) {
   EXPECT_NE(ended->error().message(), "");
   EXPECT_EQ(ended->error().message().find(folder_.path().string()), std::string::npos)
       << ended->error().message();
+}
+
+TEST_F(ServerTest, UploadedArchivesBecomeMaterials) {
+  const auto btf = AsymmetricBtf(8, 6, WholeDegreeDirections(2, 3), WholeDegreeDirections(2, 4));
+  const ScratchFolder scratch;
+  FileMap files = Ubo2003Files(*btf, TestImageKind::kPng8, "");
+  const auto zip_of = [&](const std::string& name) {
+    WriteZip(files, scratch.path() / name, ZipPacking::kDeflated);
+    std::ifstream file(scratch.path() / name, std::ios::binary);
+    return std::string(std::istreambuf_iterator<char>(file), {});
+  };
+  v1::ImportMaterialRequest request;
+  request.mutable_encode()->set_kl(4);
+  request.mutable_encode()->set_kv(4);
+  request.mutable_provenance()->set_licence("CC0");
+  const auto import = [&](const std::string& name, const std::string& bytes) -> v1::Job {
+    request.set_name("materials/" + name);
+    request.set_archive_sha256(stubs_->Upload(bytes));
+    const auto job = Stubs::Call(&v1::Materials::Stub::ImportMaterial, *stubs_->materials, request);
+    EXPECT_TRUE(job.ok()) << job.status();
+    return *stubs_->Wait(job->name());
+  };
+  for (const auto& [name, bytes] :
+       FileMap{{"zip", zip_of("a.zip")}, {"exr", MultiPartExr(*btf, ExrPartKind::kHalf)}}) {
+    const v1::Job job = import(name, bytes);
+    ASSERT_EQ(job.state(), v1::Job::SUCCEEDED) << job.DebugString();
+    const auto material = stubs_->GetMaterial(name);
+    EXPECT_EQ(material->width(), 8u);
+    EXPECT_EQ(material->height(), 6u);
+    EXPECT_EQ(material->num_views(), btf->info().views.size());
+    EXPECT_EQ(material->num_lights(), btf->info().lights.size());
+    EXPECT_EQ(material->provenance().licence(), "CC0");
+    const auto container = stubs_->Download(material->blob().sha256());
+    EXPECT_TRUE(ParseMaterial(std::as_bytes(std::span(*container))).ok());
+  }
+  files.erase(files.begin());
+  const v1::Job job = import("incomplete", zip_of("b.zip"));
+  EXPECT_EQ(job.state(), v1::Job::FAILED);
+  EXPECT_EQ(job.error().detail().reason(), "ARGUMENT_INVALID") << job.DebugString();
+  EXPECT_EQ(job.error().message().find(folder_.path().string()), std::string::npos) << job.error().message();
+  EXPECT_TRUE(std::filesystem::is_empty(folder_.path() / "scratch"));
 }
 
 TEST_F(ServerTest, AWatchFollowsAJobAndResumes) {

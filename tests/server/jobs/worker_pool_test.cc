@@ -214,6 +214,23 @@ TEST_F(WorkerPoolTest, ANameTakenMeanwhileFailsTheJob) {
   EXPECT_EQ(Material("wool")->blob().sha256(), *blob);
 }
 
+TEST(JobEventsTest, NothingElseBearsTheNumberOfTheLastEvent) {
+  JobEvents events;
+  JobRecord record;
+  record.id = 1;
+  record.sequence = 2;
+  record.job.set_state(v1::Job::RUNNING);
+  events.BeginRun(record);
+  events.Report(1, {"stage", 1, 10, "rows"});
+  const uint64_t last = events.NextSequence(1);
+  // The end is being written: whoever asks now still sees a running job, and must be told of the end
+  // afterwards.
+  EXPECT_LT(events.EventOf(record).sequence(), last);
+  events.Report(1, {"other stage", 1, 10, "rows"});
+  EXPECT_LT(events.EventOf(record).sequence(), last);
+  EXPECT_EQ(events.NextSequence(1), last);
+}
+
 TEST_F(WorkerPoolTest, EventsGrowAndEndWithTheJob) {
   std::mutex mutex;
   std::condition_variable ended;
