@@ -1,0 +1,306 @@
+"""The command line as a newcomer meets it: every noun once, through a real socket, from generating a material to the
+pictures of a re-dressed mesh."""
+
+import json
+import os
+import re
+import signal
+import subprocess
+
+import harness
+from harness import decode_png
+
+# Small enough for a test, large enough for the synthesis to work with.
+GENERATE = ["--size", 64, "--lights", "4x6", "--views", "4x6", "--kl", 4, "--kv", 4]
+SYNTHESIZE = ["--arrangement", "surface-96", "--tile", 16, "--strip", 8]
+REDRESS_LIMIT_MS = 10
+
+
+class NoServerTest(harness.unittest.TestCase):
+    """What works, and what is said, where no server is."""
+
+    def tessera(self, *words, **variables):
+        environment = {key: value for key, value in os.environ.items() if key != "TESSERA_SERVER"}
+        command = [harness.options.bin / "tessera", *words]
+        return harness.Result(command, subprocess.run(command, env=dict(environment, **variables), text=True,
+                                                      capture_output=True, timeout=60))
+
+    def test_no_server_is_3_and_tells_how_to_start_one(self):
+        result = self.tessera("server", "status", "--server", "127.0.0.1:1")
+        self.assertEqual(result.code, 3, result)
+        self.assertIn("no server at 127.0.0.1:1", result.err)
+        self.assertIn("tessera-server --data DIR --listen 127.0.0.1:1", result.err)
+        self.assertEqual(result.out, "")
+        error = json.loads(self.tessera("server", "status", "--json", TESSERA_SERVER="127.0.0.1:1").err)["error"]
+        self.assertEqual((error["code"], error["exit_code"]), ("UNAVAILABLE", 3))
+        self.assertIn("tessera-server", error["hint"])
+
+    def test_usage_is_2(self):
+        for words in ([], ["material"], ["nonsense"], ["material", "show"], ["material", "list", "--nonsense"],
+                      ["server", "status", "--server", "nowhere"],
+                      ["preview", "surface-96/x", "--mesh", "builtin:torus", "--size", "3x4", "-o", "x.png"],
+                      ["preview", "surface-96/x", "--mesh", "builtin:torus", "-o", "x.jpg"],
+                      ["preview", "surface-96/x", "-o", "x.png"]):
+            result = self.tessera(*words)
+            self.assertEqual(result.code, 2, result)
+            self.assertEqual(result.out, "", result)
+
+    def test_help_lists_nouns_and_exit_codes(self):
+        result = self.tessera("--help")
+        self.assertEqual(result.code, 0, result)
+        for word in ("material", "arrangement", "tileset", "mesh", "preview", "job", "server", "TESSERA_SERVER",
+                     "Exit codes", "130"):
+            self.assertIn(word, result.out)
+        self.assertRegex(self.tessera("--version").out, r"^tessera \d+\.\d+\.\d+\n$")
+
+    def test_bash_completes_commands_options_and_nothing_wrong(self):
+        script = self.tessera("completion", "bash").out
+
+        def complete(*words):
+            shell = f"{script}\nCOMP_WORDS=({' '.join(words)}); COMP_CWORD={len(words) - 1}; _tessera; " \
+                    "printf '%s\\n' \"${COMPREPLY[@]}\""
+            done = subprocess.run(["bash", "-c", shell], text=True, capture_output=True, timeout=60)
+            self.assertEqual((done.returncode, done.stderr), (0, ""))
+            return done.stdout.split()
+
+        self.assertEqual(complete("tessera", "til"), ["tileset"])
+        self.assertEqual(complete("tessera", "tileset", "syn"), ["synthesize"])
+        self.assertEqual(complete("tessera", "--json", "tileset", "synthesize", "wool", "--arr"), ["--arrangement"])
+        self.assertEqual(complete("tessera", "tileset", "zzz"), [])
+
+    def test_meshes_need_no_server(self):
+        folder = harness.pathlib.Path(harness.tempfile.mkdtemp(prefix="tessera-e2e-"))
+        try:
+            output = folder / "torus.tsra"
+            result = self.tessera("mesh", "dress", "builtin:torus", "--arrangement", "surface-96", "-o", str(output),
+                                  "--json", TESSERA_SERVER="127.0.0.1:1")
+            self.assertEqual(result.code, 0, result)
+            self.assertGreater(result.json()["num_quads"], 0)
+            self.assertEqual(output.read_bytes()[:8], b"TESSERA\0")
+            info = self.tessera("mesh", "info", "builtin:genus3", "--json").json()
+            self.assertEqual((info["genus"], info["num_boundary_edges"]), (3, 0))
+
+            triangle = folder / "triangle.obj"
+            triangle.write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
+            refused = self.tessera("mesh", "dress", str(triangle), "--arrangement", "surface-96", "-o",
+                                   str(folder / "t.tsra"))
+            self.assertEqual(refused.code, 5, refused)
+            self.assertIn("triangle.obj", refused.err)
+            missing = self.tessera("mesh", "info", str(folder / "none.obj"))
+            self.assertEqual(missing.code, 4, missing)
+            unwritable = self.tessera("mesh", "dress", "builtin:torus", "--arrangement", "surface-96", "-o",
+                                      str(folder / "no" / "x.tsra"))
+            self.assertEqual(unwritable.code, 4, unwritable)
+            # Nothing half-written, whatever happened.
+            self.assertEqual(sorted(path.name for path in folder.iterdir()), ["torus.tsra", "triangle.obj"])
+        finally:
+            harness.shutil.rmtree(folder)
+
+
+class MainJobTest(harness.CommandTest):
+    """One server, one story; the tests run in alphabetical order and build on each other."""
+
+    def picture(self, name):
+        """Width, height, and how many different pixels: a picture of one colour shows nothing."""
+        width, height, channels, rows = decode_png((self.folder / name).read_bytes())
+        pixels = {bytes(row[i:i + channels]) for row in rows for i in range(0, len(row), channels)}
+        return width, height, len(pixels)
+
+    def test_a_generate(self):
+        made = self.run_json("material", "generate", "reactdiffuse", "--name", "leopard", "--seed", 3, *GENERATE)
+        self.assertEqual(made["material"]["name"], "leopard")
+        self.assertEqual((made["material"]["width"], made["material"]["num_coefficients"]), (64, 48))
+        self.assertTrue(made["stages"])
+        text = self.run_ok("material", "generate", "wrinkles", "--name", "skin", *GENERATE)
+        self.assertRegex(text.out, r"skin: 64x64 texels, 24 views, 24 lights")
+        # Off a terminal nothing is animated.
+        self.assertNotRegex(text.err, r"[\r\033]")
+        self.assertEqual([m["name"] for m in self.run_json("material", "list")["materials"]], ["leopard", "skin"])
+        self.assertIn("leopard", self.run_ok("material", "list").out)
+        self.assertEqual(self.run_json("material", "show", "leopard")["codec"], "dsh-cls")
+
+    def test_b_names_that_are_taken_or_not_there(self):
+        again = ["material", "generate", "reactdiffuse", "--name", "leopard", *GENERATE]
+        self.assert_fails(5, *again, reason="NAME_TAKEN")
+        self.assert_fails(5, "material", "generate", "marble", "--name", "m", *GENERATE)
+        self.assert_fails(5, "material", "show", "No Such Name", reason="NAME_INVALID")
+        self.assert_fails(4, "material", "show", "none", reason="NOT_FOUND")
+        self.assert_fails(4, "material", "pull", "none", "-o", "none.tsra", reason="NOT_FOUND")
+        self.assert_fails(4, "tileset", "show", "surface-96/none", reason="NOT_FOUND")
+        self.assert_fails(4, "arrangement", "show", "plane-17", reason="NOT_FOUND")
+        self.assert_fails(4, "job", "show", "999999", reason="NOT_FOUND")
+        self.assert_fails(4, "material", "import", "no-such-folder", "--name", "x")
+        self.assertFalse((self.folder / "none.tsra").exists())
+
+    def test_c_materials_decode(self):
+        self.run_ok("material", "decode", "leopard", "--light", "45,90", "--view", "0,0", "-o", "flat.png")
+        width, height, colours = self.picture("flat.png")
+        self.assertEqual((width, height), (64, 64))
+        self.assertGreater(colours, 20)
+        self.run_ok("material", "decode", "leopard", "--light", "45,90", "--view", "0,0", "-o", "flat.exr")
+        self.assertEqual((self.folder / "flat.exr").read_bytes()[:4], b"\x76\x2f\x31\x01")
+        self.run_ok("material", "pull", "leopard", "-o", "leopard.tsra")
+        self.assertEqual((self.folder / "leopard.tsra").read_bytes()[:8], b"TESSERA\0")
+
+    def test_d_synthesize(self):
+        for material in ("leopard", "skin"):
+            made = self.run_json("tileset", "synthesize", material, *SYNTHESIZE, "--force")
+            self.assertEqual(made["tile_set"]["name"], f"surface-96/{material}")
+            self.assertEqual((made["tile_set"]["num_tiles"], made["tile_set"]["tile_size"]), (96, 16))
+        names = [t["name"] for t in self.run_json("tileset", "list", "--arrangement", "surface-96")["tile_sets"]]
+        self.assertEqual(names, ["surface-96/leopard", "surface-96/skin"])
+        self.assertEqual(self.run_json("tileset", "list", "--arrangement", "plane-16")["tile_sets"], [])
+        self.assertIn("surface-96/skin", self.run_ok("tileset", "list").out)
+        self.assertEqual(self.run_json("tileset", "show", "surface-96/skin")["strip_height"], 8)
+        self.assertIn("certificate", self.run_json("tileset", "certify", "surface-96/skin"))
+        self.assert_fails(5, "tileset", "synthesize", "skin", *SYNTHESIZE, "--force", reason="NAME_TAKEN")
+        self.run_ok("tileset", "pull", "surface-96/skin", "-o", "skin-tiles.tsra")
+        self.run_ok("tileset", "sheet", "surface-96/skin", "-o", "tiles.png")
+        self.assertGreater(self.picture("tiles.png")[2], 20)
+        # A strip that is as large as the material cannot be cut from it.
+        result = self.tessera("tileset", "synthesize", "skin", "--arrangement", "surface-96", "--tile", 128, "--strip", 64,
+                              "--force", "--name", "too-large", "--json")
+        self.assertIn(result.code, (5, 6), result)
+        self.assertEqual(json.loads(result.err.splitlines()[-1])["error"]["reason"], "MATERIAL_TOO_SMALL", result)
+
+    def test_e_dress_and_redress(self):
+        self.assertEqual([a["name"] for a in self.run_json("arrangement", "list")["arrangements"]],
+                         ["plane-16", "surface-96"])
+        self.assertEqual(self.run_json("arrangement", "show", "surface-96")["num_tiles"], 96)
+        here = self.run_json("mesh", "dress", "builtin:torus", "--arrangement", "surface-96", "--seed", 5, "-o", "here.tsra")
+        there = self.run_json("mesh", "dress", "builtin:torus", "--arrangement", "surface-96", "--seed", 5, "--on-server",
+                              "-o", "there.tsra")
+        self.assertEqual(here["num_quads"], there["num_quads"])
+        self.assertEqual((self.folder / "here.tsra").read_bytes(), (self.folder / "there.tsra").read_bytes())
+        for tile_set in ("surface-96/leopard", "surface-96/skin", "skin-tiles.tsra"):
+            bound = self.run_json("mesh", "redress", "here.tsra", "--tileset", tile_set)
+            self.assertEqual(bound["num_quads"], here["num_quads"])
+            self.assertLess(bound["bind_ms"], REDRESS_LIMIT_MS)
+        self.assertRegex(self.run_ok("mesh", "redress", "here.tsra", "--tileset", "surface-96/skin").out,
+                         r"quads bound to surface-96/skin in [\d.]+ ms \([\d.]+ ms with getting the tile set\)")
+        self.run_ok("mesh", "dress", "builtin:plane", "--arrangement", "plane-16", "-o", "plane.tsra")
+        self.assert_fails(5, "mesh", "redress", "plane.tsra", "--tileset", "surface-96/skin", says="plane-16")
+        self.assert_fails(5, "mesh", "dress", "builtin:genus3", "--arrangement", "plane-16", "-o", "g.tsra", says="break")
+        # A container of another kind is no dressing.
+        self.assert_fails(5, "mesh", "redress", "skin-tiles.tsra", "--tileset", "surface-96/skin")
+
+    def test_f_preview(self):
+        self.run_ok("preview", "surface-96/skin", "--dressing", "here.tsra", "--light", "35,120", "--size", "160x120",
+                    "-o", "skin.png")
+        width, height, colours = self.picture("skin.png")
+        self.assertEqual((width, height), (160, 120))
+        self.assertGreater(colours, 100)
+        several = self.run_json("preview", "surface-96/skin", "surface-96/leopard", "--dressing", "here.tsra", "--light",
+                                "35,120", "--light", "point:0,2,2,4", "--size", "160x120", "-o", "both.png")
+        self.assertEqual([f["file"] for f in several["files"]],
+                         ["both-surface-96-skin.png", "both-surface-96-leopard.png"])
+        first, second = [(self.folder / f["file"]).read_bytes() for f in several["files"]]
+        self.assertNotEqual(first, second)
+        # The mesh dressed on the way with the same seed gives the same picture.
+        self.run_ok("preview", "surface-96/skin", "--mesh", "builtin:torus", "--seed", 5, "--light", "35,120", "--size",
+                    "160x120", "-o", "mesh.png")
+        self.assertEqual((self.folder / "mesh.png").read_bytes(), (self.folder / "skin.png").read_bytes())
+        self.run_ok("preview", "surface-96/skin", "--mesh", "builtin:torus", "--size", "64x48", "-o", "skin.exr")
+        self.assertEqual((self.folder / "skin.exr").read_bytes()[:4], b"\x76\x2f\x31\x01")
+        self.assert_fails(4, "preview", "surface-96/none", "--mesh", "builtin:torus", "-o", "none.png")
+        self.assertFalse((self.folder / "none.png").exists())
+        self.run_ok("sheet", "skin.png", "both-surface-96-leopard.png", "--columns", 2, "-o", "sheet.png")
+        self.assertEqual(self.picture("sheet.png")[:2], (2 * 168 + 8, 128 + 8))
+
+    def test_g_jobs(self):
+        jobs = self.run_json("job", "list")["jobs"]
+        self.assertGreaterEqual({job["kind"] for job in jobs}, {"generate", "synthesize"})
+        done = next(job for job in jobs if job["state"] == "SUCCEEDED")
+        watched = self.run_ok("job", "watch", done["name"], "--json").out.splitlines()
+        self.assertEqual(json.loads(watched[-1])["job"]["state"], "SUCCEEDED")
+        self.assertIn(done["name"], self.run_ok("job", "show", done["name"]).out)
+
+        slow = self.start_slow("slow")
+        self.assertEqual(self.run_json("job", "cancel", slow)["name"], slow)
+        self.assertTrue(harness.wait_until(lambda: self.state_of(slow) == "CANCELLED", 5), self.state_of(slow))
+        result = self.tessera("job", "watch", slow)
+        self.assertEqual(result.code, 6, result)
+        self.assertIn("CANCELLED", result.out)
+
+    def start_slow(self, name):
+        job = self.run_json("material", "generate", "weave", "--name", name, "--size", 512, "--detach")["name"]
+        self.assertTrue(harness.wait_until(lambda: self.state_of(job) == "RUNNING", 20))
+        return job
+
+    def state_of(self, job):
+        return self.run_json("job", "show", job)["state"]
+
+    def test_h_interrupt_cancels_the_work(self):
+        before = {job["name"] for job in self.run_json("job", "list")["jobs"]}
+        process = subprocess.Popen(self.command("material", "generate", "weave", "--name", "interrupted", "--size", 512),
+                                   cwd=self.folder, env=self.environment(), text=True, stdout=subprocess.PIPE,
+                                   stderr=subprocess.PIPE)
+        new_jobs = lambda: [job for job in self.run_json("job", "list")["jobs"] if job["name"] not in before]
+        self.assertTrue(harness.wait_until(lambda: any(job["state"] == "RUNNING" for job in new_jobs()), 20))
+        process.send_signal(signal.SIGINT)
+        out, err = process.communicate(timeout=20)
+        self.assertEqual((process.returncode, out), (130, ""), err)
+        self.assertIn("interrupted: cancelling", err)
+        job = new_jobs()[0]["name"]
+        self.assertTrue(harness.wait_until(lambda: self.state_of(job) == "CANCELLED", 5), self.state_of(job))
+        self.assert_fails(4, "material", "show", "interrupted", reason="NOT_FOUND")
+
+    def test_i_import_of_a_folder_and_of_an_archive(self):
+        folder = self.folder / "BTF"
+        write_ubo_folder(folder)
+        imported = self.run_json("material", "import", "BTF", "--name", "tiny", "--kl", 4, "--kv", 4, "--source",
+                                 "this test", "--licence", "CC0-1.0", "--citation", "none needed")
+        self.assertEqual((imported["material"]["num_views"], imported["material"]["num_lights"]), (5, 5))
+        self.assertEqual(imported["material"]["provenance"],
+                         {"source": "this test", "licence": "CC0-1.0", "citation": "none needed"})
+        self.assertGreaterEqual({stage["stage"] for stage in imported["stages"]}, {"images", "uploading"})
+        archive = harness.shutil.make_archive(str(self.folder / "BTF"), "zip", self.folder, "BTF")
+        there = self.run_json("material", "import", archive, "--on-server", "--name", "tiny-there", "--kl", 4, "--kv", 4)
+        self.assertEqual(there["material"]["num_views"], 5)
+        # The same samples, the same codec: the same picture from either.
+        for name in ("tiny", "tiny-there"):
+            self.run_ok("material", "decode", name, "--light", "30,40", "--view", "20,10", "-o", f"{name}.png")
+        self.assertEqual((self.folder / "tiny.png").read_bytes(), (self.folder / "tiny-there.png").read_bytes())
+
+        self.assert_fails(5, "material", "import", "BTF", "--on-server", "--name", "x", says="zip")
+        next(folder.rglob("*.png")).unlink()
+        self.assert_fails(5, "material", "import", "BTF", "--name", "x")
+        self.assert_fails(4, "material", "show", "x")
+
+    def test_j_replace_and_delete(self):
+        before = self.run_json("material", "show", "leopard")["blob"]["sha256"]
+        after = self.run_json("material", "generate", "reactdiffuse", "--name", "leopard", "--seed", 4, "--replace", *GENERATE)
+        self.assertNotEqual(before, after["material"]["blob"]["sha256"])
+        self.run_ok("tileset", "delete", "surface-96/leopard")
+        self.assert_fails(4, "tileset", "show", "surface-96/leopard")
+        self.run_ok("material", "delete", "leopard")
+        self.assert_fails(4, "material", "delete", "leopard")
+        status = self.run_json("server", "status")
+        self.assertEqual(status["address"], self.server.address)
+        self.assertEqual(status["num_tile_sets"], 1)
+        self.assertRegex(self.run_ok("server", "status").out, re.compile(r"^num_materials: +\d", re.M))
+
+    def test_k_a_stopped_server_is_no_server(self):
+        self.assertEqual(self.server.stop(), 0, self.server.log_text())
+        self.assert_fails(3, "material", "list", says="tessera-server --data")
+
+
+def write_ubo_folder(folder):
+    """5 views by 5 lights of 32x32 texels in the UBO2003 layout."""
+    import numpy
+
+    directions = [(0, 0), (60, 0), (60, 90), (60, 180), (60, 270)]
+    x, y = numpy.meshgrid(numpy.arange(32), numpy.arange(32))
+    height = numpy.sin(2 * numpy.pi * x / 8) * numpy.cos(2 * numpy.pi * y / 8)
+    for view_polar, view_azimuth in directions:
+        view = folder / f"tv{view_polar:03}_pv{view_azimuth:03}"
+        view.mkdir(parents=True)
+        for i, (polar, azimuth) in enumerate(directions):
+            lit = numpy.cos(numpy.radians(polar)) * (0.5 + 0.3 * height * numpy.cos(numpy.radians(azimuth)))
+            grey = numpy.round(255 * lit * numpy.cos(numpy.radians(view_polar / 2))).astype(numpy.uint8)
+            name = f"{i:05} tl{polar:03} pl{azimuth:03} tv{view_polar:03} pv{view_azimuth:03}.png"
+            (view / name).write_bytes(harness.encode_png(numpy.stack([grey, grey, grey], axis=-1)))
+
+
+if __name__ == "__main__":
+    harness.main()
