@@ -8,20 +8,6 @@
 #include <Eigen/Eigenvalues>
 
 namespace tessera {
-namespace {
-
-// Correctly rounded, so the same on every machine; Eigen's packet square root refines the processor's own
-// estimate.
-template <typename Lanes>
-Lanes Sqrt(const Lanes& x) {
-  Lanes root;
-  for (int i = 0; i < Lanes::SizeAtCompileTime; ++i) {
-    root[i] = std::sqrt(x[i]);
-  }
-  return root;
-}
-
-}  // namespace
 
 template <typename Scalar>
 ClsSolver<Scalar>::ClsSolver(const Eigen::MatrixXd& basis) {
@@ -49,7 +35,11 @@ void ClsSolver<Scalar>::Shrink(const Eigen::Ref<const Vector>& energies,
     Scalar* const block = projected.data() + row;
     const Eigen::Index stride = projected.outerStride();
     const Lanes energy = energies.template segment<kLanes>(row).array();
-    const Lanes inverse_radius = Sqrt<Lanes>(energy.max(tiny)).inverse();
+    Lanes inverse_radius;
+    for (int lane = 0; lane < kLanes; ++lane) {
+      // std::sqrt is correctly rounded, so the same on every machine; Eigen's packets refine an estimate.
+      inverse_radius[lane] = Scalar(1) / std::sqrt(std::max(energy[lane], tiny));
+    }
     // Every term alone bounds lambda from below: |p_i| / (w_i + lambda) <= sqrt(E).
     Lanes lambda = Lanes::Constant(floor);
     for (Eigen::Index i = 0; i < n; ++i) {
@@ -67,13 +57,16 @@ void ClsSolver<Scalar>::Shrink(const Eigen::Ref<const Vector>& energies,
         norm2 += c2;
         slope += c2 * inverse;
       }
-      const auto is_above = norm2 > limit;
-      if (!is_above.any()) {
+      if (!((norm2 - limit).maxCoeff() > Scalar(0))) {
         break;
       }
-      // A signal that has converged keeps its lambda, so the others in its group cannot move it.
-      const Lanes next = lambda + norm2 / slope * (Sqrt<Lanes>(norm2) * inverse_radius - Scalar(1));
-      lambda = is_above.select(next, lambda);
+      // A signal that has converged keeps its lambda, so the others in its group cannot move it. Plain lanes,
+      // for the compiler to turn into a blend: Eigen's select is not vectorised.
+      for (int lane = 0; lane < kLanes; ++lane) {
+        const Scalar excess = std::sqrt(norm2[lane]) * inverse_radius[lane] - Scalar(1);
+        const Scalar next = lambda[lane] + norm2[lane] / slope[lane] * excess;
+        lambda[lane] = norm2[lane] > limit[lane] ? next : lambda[lane];
+      }
     }
     for (Eigen::Index i = 0; i < n; ++i) {
       Eigen::Map<Lanes> p(block + i * stride);

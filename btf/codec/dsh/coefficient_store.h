@@ -8,6 +8,7 @@
 #pragma once
 
 #include <cstdint>
+#include <cstdlib>
 #include <memory>
 #include <span>
 
@@ -15,6 +16,10 @@
 #include <absl/status/statusor.h>
 
 namespace tessera {
+
+struct FreeDeleter {
+  void operator()(float* memory) const { std::free(memory); }
+};
 
 // Not thread-safe; the span of a block may be filled by many threads.
 class CoefficientStore {
@@ -43,8 +48,8 @@ class CoefficientStore {
   std::span<float> Resize(uint64_t count);
 
   int file_ = -1;
-  std::unique_ptr<float[]> values_;  // all of them, or the block in use
-  uint64_t num_values_ = 0;          // in values_
+  std::unique_ptr<float[], FreeDeleter> values_;  // all of them, or the block in use
+  uint64_t num_values_ = 0;                       // in values_
   uint64_t block_begin_ = 0;
   uint64_t block_size_ = 0;
 };

@@ -1,7 +1,6 @@
 #include "btf/codec/dsh/dsh_encoder.h"
 
 #include <algorithm>
-#include <array>
 #include <atomic>
 #include <cmath>
 #include <limits>
@@ -27,10 +26,11 @@ namespace {
 using Solver = ClsSolver<float>;
 using MatrixMap = Eigen::Map<const Eigen::MatrixXf>;
 
-// Texels fitted together. Their samples (0.3 MB at 81 x 81) and the products stay in the second-level cache.
-// Part of the result: sums are formed group by group, so it depends neither on the budget nor on threads.
-constexpr int kTexelsPerGroup = 4;
-constexpr int kGroupsPerTask = 4;
+// Signals fitted together, about: few enough for the products' operands to stay in the second-level cache
+// (and Eigen's copies of them on the stack), enough to fill vectors where there are few views. Sums are
+// formed within a signal only, and groups are cut the same way for any budget and number of threads.
+constexpr int64_t kSignalsPerGroup = 256;
+constexpr int64_t kSamplesPerTask = 1 << 18;
 // More rows at once gain nothing.
 constexpr uint64_t kMaxRowBlockBytes = uint64_t{64} << 20;
 
@@ -40,18 +40,21 @@ Eigen::Index PadToLanes(Eigen::Index rows) {
 
 // sum f^2 in a fixed order whatever the address, which decides how a library would cut the sum.
 float SumOfSquares(const float* f, Eigen::Index count) {
-  constexpr int kWidth = 8;
-  std::array<float, kWidth> sums{};
+  using Lanes = Eigen::Array<float, 8, 1>;
+  constexpr Eigen::Index kWidth = Lanes::SizeAtCompileTime;
+  Lanes even = Lanes::Zero();  // two sums, so that one addition need not wait for the other
+  Lanes odd = Lanes::Zero();
   Eigen::Index i = 0;
-  for (; i + kWidth <= count; i += kWidth) {
-    for (int lane = 0; lane < kWidth; ++lane) {
-      sums[lane] += f[i + lane] * f[i + lane];
-    }
+  for (; i + 2 * kWidth <= count; i += 2 * kWidth) {
+    even += Eigen::Map<const Lanes>(f + i).square();
+    odd += Eigen::Map<const Lanes>(f + i + kWidth).square();
   }
+  float rest = 0.0F;
   for (; i < count; ++i) {
-    sums[0] += f[i] * f[i];
+    rest += f[i] * f[i];
   }
-  return ((sums[0] + sums[4]) + (sums[2] + sums[6])) + ((sums[1] + sums[5]) + (sums[3] + sums[7]));
+  even += odd;
+  return rest + even.sum();
 }
 
 bool IsLegalSample(float f) {
@@ -70,16 +73,39 @@ Eigen::MatrixXd BasisOf(const std::vector<Direction>& directions, int num_functi
   return ShMatrix(num_functions, vectors);
 }
 
+// Intermediate results of one group of texels.
+struct Scratch {
+  Eigen::MatrixXf projected;  // [signals, padded][kl], then [kv]
+  Eigen::VectorXf energies;
+  Eigen::MatrixXf view_samples;  // [views][(texel, channel, i)]
+  Eigen::MatrixXf coefficients;  // [(texel, channel, i)][kv]
+};
+
+// Scratch that outlives its task: returned to the system after each, its pages would be faulted in again.
+class ScratchPool {
+ public:
+  std::unique_ptr<Scratch> Take() {
+    const std::lock_guard lock(mutex_);
+    if (free_.empty()) {
+      return std::make_unique<Scratch>();
+    }
+    std::unique_ptr<Scratch> scratch = std::move(free_.back());
+    free_.pop_back();
+    return scratch;
+  }
+  void Return(std::unique_ptr<Scratch> scratch) {
+    const std::lock_guard lock(mutex_);
+    free_.push_back(std::move(scratch));
+  }
+
+ private:
+  std::mutex mutex_;
+  std::vector<std::unique_ptr<Scratch>> free_;  // guarded by mutex_
+};
+
 // Both passes for groups of texels. Immutable; each task brings its own scratch.
 class GroupFitter {
  public:
-  struct Scratch {
-    Eigen::MatrixXf projected;  // [signals, padded][kl], then [kv]
-    Eigen::VectorXf energies;
-    Eigen::MatrixXf view_samples;  // [views][(texel, channel, i)]
-    Eigen::MatrixXf coefficients;  // [(texel, channel, i)][kv]
-  };
-
   GroupFitter(const BtfInfo& info, const EncodeParams& params)
       : num_lights_(static_cast<Eigen::Index>(info.lights.size())),
         num_views_(static_cast<Eigen::Index>(info.views.size())),
@@ -92,6 +118,9 @@ class GroupFitter {
         light_solver_(BasisOf(info.lights, params.kl)),
         view_solver_(BasisOf(info.views, params.kv)) {}
 
+  [[nodiscard]] int64_t TexelsPerGroup() const {
+    return std::max<int64_t>(1, kSignalsPerGroup / (3 * std::max<int64_t>(num_views_, kl_)));
+  }
   [[nodiscard]] size_t SamplesPerTexel() const { return static_cast<size_t>(3 * num_views_ * num_lights_); }
   [[nodiscard]] size_t CoefficientsPerTexel() const { return static_cast<size_t>(3) * kl_ * kv_; }
 
@@ -239,20 +268,23 @@ struct Ranges {
 
 // Fits rows of samples into `coefficients` [row][x][k] and widens `ranges`. False on an illegal sample.
 bool FitRows(const GroupFitter& fitter, int width, int num_rows, std::span<const float> samples,
-             std::span<float> coefficients, Ranges& ranges, const RunContext& context) {
+             std::span<float> coefficients, Ranges& ranges, ScratchPool& pool, const RunContext& context) {
   const size_t k = fitter.CoefficientsPerTexel();
-  const int64_t groups_per_row = (width + kTexelsPerGroup - 1) / kTexelsPerGroup;
+  const int64_t texels_per_group = fitter.TexelsPerGroup();
+  const int64_t groups_per_row = (width + texels_per_group - 1) / texels_per_group;
+  const int64_t groups_per_task = std::max<int64_t>(
+      1, kSamplesPerTask / (texels_per_group * static_cast<int64_t>(fitter.SamplesPerTexel())));
   std::atomic<bool> is_legal = true;
   std::mutex mutex;  // guards `ranges`
-  ParallelFor(context, 0, groups_per_row * num_rows, kGroupsPerTask, [&](int64_t begin, int64_t end) {
-    GroupFitter::Scratch scratch;
+  ParallelFor(context, 0, groups_per_row * num_rows, groups_per_task, [&](int64_t begin, int64_t end) {
+    std::unique_ptr<Scratch> scratch = pool.Take();
     Ranges local(k);
     for (int64_t group = begin; group < end; ++group) {
-      const int64_t x = group % groups_per_row * kTexelsPerGroup;
+      const int64_t x = group % groups_per_row * texels_per_group;
       const size_t texel = static_cast<size_t>(group / groups_per_row * width + x);
-      const int num_texels = static_cast<int>(std::min<int64_t>(kTexelsPerGroup, width - x));
+      const int num_texels = static_cast<int>(std::min<int64_t>(texels_per_group, width - x));
       float* const out = coefficients.data() + texel * k;
-      if (!fitter.Fit(samples.data() + texel * fitter.SamplesPerTexel(), num_texels, out, scratch)) {
+      if (!fitter.Fit(samples.data() + texel * fitter.SamplesPerTexel(), num_texels, out, *scratch)) {
         is_legal = false;
         return;
       }
@@ -261,6 +293,7 @@ bool FitRows(const GroupFitter& fitter, int width, int num_rows, std::span<const
         local.Include(one, one);
       }
     }
+    pool.Return(std::move(scratch));
     const std::lock_guard lock(mutex);
     ranges.Include(local.minima, local.maxima);
   });
@@ -303,6 +336,7 @@ absl::StatusOr<Material> EncodeDshCls(BtfSource& source, const EncodeParams& par
                                         block_bytes, info.height);
 
   Ranges ranges(k);
+  ScratchPool pool;
   // Not zeroed, the source fills it.
   auto sample_buffer = std::make_unique_for_overwrite<float[]>(source.SamplesPerRow() * rows_per_block);
   for (int row = 0; row < info.height; row += rows_per_block) {
@@ -312,7 +346,7 @@ absl::StatusOr<Material> EncodeDshCls(BtfSource& source, const EncodeParams& par
     const std::span<float> samples(sample_buffer.get(), source.SamplesPerRow() * num_rows);
     TESSERA_RETURN_IF_ERROR(source.ReadRows(row, num_rows, samples, context));
     const std::span<float> block = store->BeginWrite(values_per_row * row, values_per_row * num_rows);
-    const bool is_legal = FitRows(fitter, info.width, num_rows, samples, block, ranges, context);
+    const bool is_legal = FitRows(fitter, info.width, num_rows, samples, block, ranges, pool, context);
     TESSERA_RETURN_IF_ERROR(context.CheckStop());
     if (!is_legal) {
       return IllegalSampleError(info, row, samples);
