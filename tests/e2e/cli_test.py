@@ -111,6 +111,10 @@ class MainJobTest(harness.CommandTest):
         self.assertEqual(made["material"]["name"], "leopard")
         self.assertEqual((made["material"]["width"], made["material"]["num_coefficients"]), (64, 48))
         self.assertTrue(made["stages"])
+        few = self.run_json("material", "generate", "weave", "--name", "cloth", "--size", 32, "--lights", 81, "--views", 81,
+                            "--kl", 1, "--kv", 1)["material"]
+        self.assertEqual((few["num_lights"], few["num_views"]), (81, 81))
+        self.run_ok("material", "delete", "cloth")
         text = self.run_ok("material", "generate", "wrinkles", "--name", "skin", *GENERATE)
         self.assertRegex(text.out, r"skin: 64x64 texels, 24 views, 24 lights")
         # Off a terminal nothing is animated.
@@ -123,6 +127,7 @@ class MainJobTest(harness.CommandTest):
         again = ["material", "generate", "reactdiffuse", "--name", "leopard", *GENERATE]
         self.assert_fails(5, *again, reason="NAME_TAKEN")
         self.assert_fails(5, "material", "generate", "marble", "--name", "m", *GENERATE)
+        self.assert_fails(5, "material", "generate", "holes", "--name", "m", "--lights", "82", says="ubo81")
         self.assert_fails(5, "material", "show", "No Such Name", reason="NAME_INVALID")
         self.assert_fails(4, "material", "show", "none", reason="NOT_FOUND")
         self.assert_fails(4, "material", "pull", "none", "-o", "none.tsra", reason="NOT_FOUND")
@@ -267,7 +272,42 @@ class MainJobTest(harness.CommandTest):
         self.assert_fails(5, "material", "import", "BTF", "--name", "x")
         self.assert_fails(4, "material", "show", "x")
 
-    def test_j_replace_and_delete(self):
+    def test_j_two_clients_at_once(self):
+        def start(name, seed, cache):
+            words = ["tileset", "synthesize", "skin", "--arrangement", "plane-16", "--tile", 16, "--strip", 8, "--seed", seed,
+                     "--name", name, "--json"]
+            return subprocess.Popen(self.command(*words), cwd=self.folder, text=True, stdout=subprocess.PIPE,
+                                    env=dict(self.environment(), XDG_CACHE_HOME=str(self.folder / cache)),
+                                    stderr=subprocess.PIPE)
+
+        def end_both(*clients):
+            ended = [(*client.communicate(timeout=harness.COMMAND_TIMEOUT_S), client.returncode) for client in clients]
+            return sorted(ended, key=lambda end: end[2])
+
+        # Each its own work: both done.
+        both = end_both(start("one", 1, "cache-1"), start("two", 2, "cache-2"))
+        self.assertEqual([code for _, _, code in both], [0, 0], both)
+        # The same work under one name: one job for both, or, where the first has ended before, the name is taken.
+        # Different work under one name: one has it, the other hears why not (5 at once, 6 when the job ends).
+        for name, seeds, codes in (("same", (3, 3), (0, 5)), ("either", (4, 5), (5, 6))):
+            first, second = end_both(*(start(name, seed, f"cache-{i}") for i, seed in enumerate(seeds)))
+            self.assertEqual(first[2], 0, first)
+            self.assertIn(second[2], codes, second)
+            if second[2] == 0:
+                self.assertEqual(json.loads(first[0])["job"], json.loads(second[0])["job"])
+            else:
+                self.assertEqual(json.loads(second[1].splitlines()[-1])["error"]["reason"], "NAME_TAKEN", second)
+        self.assertNotEqual(self.run_json("tileset", "show", "plane-16/one")["blob"],
+                            self.run_json("tileset", "show", "plane-16/two")["blob"])
+
+        # Both get the same bytes at the same time, into files of their own.
+        pulls = [subprocess.Popen(self.command("tileset", "pull", "plane-16/one", "-o", f"pulled-{i}.tsra"), cwd=self.folder,
+                                  env=self.environment(), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+                 for i in range(2)]
+        self.assertEqual([pull.wait(harness.COMMAND_TIMEOUT_S) for pull in pulls], [0, 0])
+        self.assertEqual((self.folder / "pulled-0.tsra").read_bytes(), (self.folder / "pulled-1.tsra").read_bytes())
+
+    def test_k_replace_and_delete(self):
         before = self.run_json("material", "show", "leopard")["blob"]["sha256"]
         after = self.run_json("material", "generate", "reactdiffuse", "--name", "leopard", "--seed", 4, "--replace", *GENERATE)
         self.assertNotEqual(before, after["material"]["blob"]["sha256"])
@@ -277,10 +317,10 @@ class MainJobTest(harness.CommandTest):
         self.assert_fails(4, "material", "delete", "leopard")
         status = self.run_json("server", "status")
         self.assertEqual(status["address"], self.server.address)
-        self.assertEqual(status["num_tile_sets"], 1)
+        self.assertEqual(status["num_tile_sets"], len(self.run_json("tileset", "list")["tile_sets"]))
         self.assertRegex(self.run_ok("server", "status").out, re.compile(r"^num_materials: +\d", re.M))
 
-    def test_k_a_stopped_server_is_no_server(self):
+    def test_l_a_stopped_server_is_no_server(self):
         self.assertEqual(self.server.stop(), 0, self.server.log_text())
         self.assert_fails(3, "material", "list", says="tessera-server --data")
 

@@ -1,6 +1,7 @@
-"""Reads containers of materials, tile sets and dressings and decodes BTFels, with numpy alone.
+"""Reads containers of tile sets and dressings and decodes BTFels, with numpy alone.
 
-Written from btf/codec/FORMAT.md, not from the library: this file is the proof that the page suffices.
+Written from the rules of btf/codec/FORMAT.md, sections 1 to 3, 5 and 6; neither the library nor the example at the end of
+that page is used, and the harmonics are those of the definition, not of the recurrence: so the page suffices and is right.
 """
 
 import json
@@ -70,7 +71,8 @@ class TileSet:
 
     def __init__(self, container, obey_turns=True):
         assert container.kind == "tile_set"
-        assert container.header["codec"]["id"].startswith("dsh"), container.header["codec"]
+        codec = container.header["codec"]
+        assert (codec["id"], codec["version"]) == ("dsh-cls", 1), codec
         self.obey_turns = obey_turns
         self.tile_index = container["tile_index"]
         self.tile_codes = container["tile_codes"]
@@ -80,6 +82,7 @@ class TileSet:
         by_energy = numpy.concatenate(parts, axis=1)
         codes = numpy.empty_like(by_energy)
         codes[:, order] = by_energy
+        self.kl, self.kv = codec["parameters"]["kl"], codec["parameters"]["kv"]
         self.values = container["offset"].astype(float) + container["step"].astype(float) * codes
         self.basis_light = container["basis_light"].astype(float)
         self.basis_view = container["basis_view"].astype(float)
@@ -96,7 +99,7 @@ class TileSet:
         if light[2] <= 0 or view[2] <= 0:
             return numpy.zeros(3)
         scale = min(1.0, light[2] / self.light_limit_cos) if self.light_limit_cos > 0 else 1.0
-        kl, kv = len(self.basis_light), len(self.basis_view)
+        kl, kv = self.kl, self.kv
         y_light = self.basis_light @ spherical_harmonics(kl, clamp_polar(light, self.light_limit_cos))
         y_view = self.basis_view @ spherical_harmonics(kv, clamp_polar(view, self.view_limit_cos))
         # k index = (channel * kv + j) * kl + i
