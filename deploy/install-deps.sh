@@ -8,7 +8,7 @@ build_packages=(
   g++ cmake ninja-build pkg-config ccache python3
   libgrpc++-dev protobuf-compiler-grpc libprotobuf-dev protobuf-compiler libabsl-dev
   libopenexr-dev libpng-dev libjpeg62-turbo-dev libzip-dev zlib1g-dev libzstd-dev libssl-dev
-  libeigen3-dev libtbb-dev libembree-dev libkissfft-dev libtinyobjloader-dev
+  libeigen3-dev libtbb-dev libembree-dev libkissfft-dev
   libsqlite3-dev libspdlog-dev libcli11-dev nlohmann-json3-dev
   libosmesa6-dev libglm-dev python3-glad
 )

@@ -1,7 +1,9 @@
 #include "btf/base/parallel.h"
 
 #include <algorithm>
+#include <optional>
 
+#include <tbb/global_control.h>
 #include <tbb/parallel_for.h>
 #include <tbb/task_arena.h>
 
@@ -30,7 +32,13 @@ void ParallelFor(const RunContext& context, int64_t begin, int64_t end, int64_t 
     }
     return;
   }
-  tbb::task_arena arena(NumThreads(context));
+  // TBB starts no more threads than there are cores unless told so.
+  const int num_threads = NumThreads(context);
+  std::optional<tbb::global_control> more_threads;
+  if (num_threads > tbb::this_task_arena::max_concurrency()) {
+    more_threads.emplace(tbb::global_control::max_allowed_parallelism, num_threads);
+  }
+  tbb::task_arena arena(num_threads);
   arena.execute([&] { tbb::parallel_for(int64_t{0}, num_ranges, run, tbb::simple_partitioner{}); });
 }
 

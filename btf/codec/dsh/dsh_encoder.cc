@@ -335,6 +335,10 @@ absl::StatusOr<Material> EncodeDshCls(BtfSource& source, const EncodeParams& par
   const int rows_per_block = RowsWithin(std::min(params.memory_budget_bytes - held_bytes, kMaxRowBlockBytes),
                                         block_bytes, info.height);
 
+  // One stage for the caller: the source's own rows are not told apart from their encoding.
+  RunContext source_context = context;
+  source_context.progress = nullptr;
+
   Ranges ranges(k);
   ScratchPool pool;
   // Not zeroed, the source fills it.
@@ -344,7 +348,7 @@ absl::StatusOr<Material> EncodeDshCls(BtfSource& source, const EncodeParams& par
     TESSERA_RETURN_IF_ERROR(context.CheckStop());
     const int num_rows = std::min(rows_per_block, info.height - row);
     const std::span<float> samples(sample_buffer.get(), source.SamplesPerRow() * num_rows);
-    TESSERA_RETURN_IF_ERROR(source.ReadRows(row, num_rows, samples, context));
+    TESSERA_RETURN_IF_ERROR(source.ReadRows(row, num_rows, samples, source_context));
     const std::span<float> block = store->BeginWrite(values_per_row * row, values_per_row * num_rows);
     const bool is_legal = FitRows(fitter, info.width, num_rows, samples, block, ranges, pool, context);
     TESSERA_RETURN_IF_ERROR(context.CheckStop());
