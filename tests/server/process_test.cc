@@ -10,7 +10,7 @@
 #include "tests/server/support/child_server.h"
 #include "tests/server/support/open_catalog.h"
 #include "tests/server/support/stubs.h"
-#include "tests/server/support/temporary_folder.h"
+#include "tests/support/temp_folder.h"
 
 namespace tessera {
 namespace {
@@ -41,7 +41,7 @@ void WaitForProgress(const Stubs& stubs, const std::string& job) {
 }
 
 TEST(ProcessTest, AnUploadSurvivesKill) {
-  TemporaryFolder folder;
+  TempFolder folder;
   const std::string small = TestBytes(5'000, 1);
   const std::string large = TestBytes(40'000'000, 2);
   uint64_t acknowledged = 0;
@@ -69,7 +69,7 @@ TEST(ProcessTest, AnUploadSurvivesKill) {
 }
 
 TEST(ProcessTest, AJobSurvivesKillAndEnds) {
-  TemporaryFolder folder;
+  TempFolder folder;
   std::string job;
   v1::Material made;
   {
@@ -97,7 +97,7 @@ TEST(ProcessTest, AJobSurvivesKillAndEnds) {
 }
 
 TEST(ProcessTest, AJobWhoseServerDiesThreeTimesFails) {
-  TemporaryFolder folder;
+  TempFolder folder;
   std::string job;
   for (int attempt = 1; attempt <= 3; ++attempt) {
     ChildServer server(folder.path());
@@ -116,7 +116,7 @@ TEST(ProcessTest, AJobWhoseServerDiesThreeTimesFails) {
 }
 
 TEST(ProcessTest, TermPutsJobsBack) {
-  TemporaryFolder folder;
+  TempFolder folder;
   std::string job;
   {
     ChildServer server(folder.path());
@@ -146,7 +146,7 @@ TEST(ProcessTest, TermPutsJobsBack) {
 // A limit on the size of files stands for a full disk: it needs no rights to set, and both end in the same
 // code.
 TEST(ProcessTest, AFullDiskIsSaidClearlyAndSurvived) {
-  TemporaryFolder folder;
+  TempFolder folder;
   constexpr rlim_t kLimit = 3'000'000;
   ChildServer server(folder.path(), [] {
     const rlimit limit{kLimit, kLimit};
@@ -172,7 +172,7 @@ TEST(ProcessTest, AFullDiskIsSaidClearlyAndSurvived) {
 }
 
 TEST(ProcessTest, AReadOnlyFolderIsSaidClearly) {
-  TemporaryFolder folder;
+  TempFolder folder;
   std::filesystem::permissions(folder.path(), std::filesystem::perms(0555));
   constexpr uid_t kNobody = 65534;
   ChildServer server(folder.path(), [] {
@@ -189,7 +189,7 @@ TEST(ProcessTest, AReadOnlyFolderIsSaidClearly) {
 }
 
 TEST(ProcessTest, WrongOptionsAndOpenAddressesAreRefused) {
-  TemporaryFolder folder;
+  TempFolder folder;
   ChildServer wrong(folder.path(), [] {}, {"--workers", "many"});
   EXPECT_EQ(wrong.Wait(), 2);
   ChildServer open(folder.path(), [] {}, {"--listen", "0.0.0.0:0"});

@@ -20,8 +20,8 @@
 #include "server/jobs/builtin_kinds.h"
 #include "tests/server/support/open_catalog.h"
 #include "tests/server/support/stubs.h"
-#include "tests/server/support/temporary_folder.h"
 #include "tests/support/btf_files.h"
+#include "tests/support/temp_folder.h"
 
 namespace tessera {
 namespace {
@@ -92,7 +92,7 @@ class ServerTest : public testing::Test {
     ASSERT_EQ(stubs_->GetJob(job)->state(), v1::Job::RUNNING);
   }
 
-  TemporaryFolder folder_;
+  TempFolder folder_;
   std::unique_ptr<Server> server_;
   std::unique_ptr<Stubs> stubs_;
 };
@@ -298,7 +298,7 @@ TEST_F(ServerTest, AnArchiveThatIsNoneFailsItsJobWithoutShowingPaths) {
 
 TEST_F(ServerTest, UploadedArchivesBecomeMaterials) {
   const auto btf = AsymmetricBtf(8, 6, WholeDegreeDirections(2, 3), WholeDegreeDirections(2, 4));
-  const ScratchFolder scratch;
+  const TempFolder scratch;
   FileMap files = Ubo2003Files(*btf, TestImageKind::kPng8, "");
   const auto zip_of = [&](const std::string& name) {
     WriteZip(files, scratch.path() / name, ZipPacking::kDeflated);
@@ -679,7 +679,7 @@ TEST_F(ServerTest, OneServerPerFolderAndPort) {
   const auto same_folder = Server::Start({.data_folder = folder_.path(), .listen = "127.0.0.1:0"});
   EXPECT_EQ(same_folder.status().code(), absl::StatusCode::kFailedPrecondition);
   EXPECT_NE(same_folder.status().message().find("another tessera-server"), absl::string_view::npos);
-  TemporaryFolder other;
+  TempFolder other;
   EXPECT_EQ(Server::Start({.data_folder = other.path(), .listen = server_->address()}).status().code(),
             absl::StatusCode::kUnavailable);
   server_->Stop();
@@ -688,7 +688,7 @@ TEST_F(ServerTest, OneServerPerFolderAndPort) {
 }
 
 TEST_F(ServerTest, AnOpenAddressNeedsAWord) {
-  TemporaryFolder other;
+  TempFolder other;
   EXPECT_EQ(Server::Start({.data_folder = other.path(), .listen = "0.0.0.0:0"}).status().code(),
             absl::StatusCode::kFailedPrecondition);
   EXPECT_TRUE(Server::Start({.data_folder = other.path(), .listen = "0.0.0.0:0", .insecure = true}).ok());

@@ -13,12 +13,12 @@
 #include <OpenEXR/ImfMultiPartOutputFile.h>
 #include <OpenEXR/ImfOutputPart.h>
 #include <OpenEXR/ImfPartType.h>
-#include <unistd.h>
 #include <zip.h>
 
 #include "btf/base/rng.h"
 #include "btf/image/image_io.h"
 #include "btf/image/transfer.h"
+#include "tests/support/temp_folder.h"
 
 namespace tessera {
 
@@ -59,19 +59,6 @@ Image LinearImage(const MemoryBtf& btf, size_t view, size_t light) {
 }
 
 }  // namespace
-
-ScratchFolder::ScratchFolder() {
-  std::string pattern = (std::filesystem::temp_directory_path() / "tessera_test.XXXXXX").string();
-  if (mkdtemp(pattern.data()) == nullptr) {
-    std::abort();
-  }
-  path_ = pattern;
-}
-
-ScratchFolder::~ScratchFolder() {
-  std::error_code ignored;
-  std::filesystem::remove_all(path_, ignored);
-}
 
 std::vector<Direction> WholeDegreeDirections(int num_rings, int num_azimuths) {
   std::vector<Direction> directions = {{0.0, 0.0}};
@@ -198,7 +185,7 @@ std::string MultiPartExr(const MemoryBtf& btf, ExrPartKind kind) {
       headers.push_back(std::move(header));
     }
   }
-  const ScratchFolder scratch;
+  const TempFolder scratch;
   const std::filesystem::path path = scratch.path() / "parts.exr";
   {
     Imf::MultiPartOutputFile file(path.c_str(), headers.data(), static_cast<int>(headers.size()));

@@ -15,19 +15,6 @@ namespace tessera {
 // Names, with '/' between folders, and contents.
 using FileMap = std::map<std::string, std::string>;
 
-// A folder of its own for temporary files, removed at the end.
-class ScratchFolder {
- public:
-  ScratchFolder();
-  ~ScratchFolder();
-  ScratchFolder(const ScratchFolder&) = delete;
-  ScratchFolder& operator=(const ScratchFolder&) = delete;
-  [[nodiscard]] const std::filesystem::path& path() const { return path_; }
-
- private:
-  std::filesystem::path path_;
-};
-
 // Directions at whole degrees, so that UBO2003 names can hold them.
 [[nodiscard]] std::vector<Direction> WholeDegreeDirections(int num_rings, int num_azimuths);
 

@@ -1,10 +1,12 @@
 // A folder that is gone at the end of a test.
 #pragma once
 
-#include <stdlib.h>
-
+#include <cstdlib>
 #include <filesystem>
 #include <string>
+#include <system_error>
+
+#include <stdlib.h>
 
 namespace tessera {
 
@@ -12,7 +14,10 @@ class TempFolder {
  public:
   TempFolder() {
     std::string name = (std::filesystem::temp_directory_path() / "tessera-test-XXXXXX").string();
-    path_ = ::mkdtemp(name.data());
+    if (::mkdtemp(name.data()) == nullptr) {
+      std::abort();
+    }
+    path_ = name;
   }
   ~TempFolder() {
     std::error_code ignored;
@@ -21,7 +26,7 @@ class TempFolder {
   TempFolder(const TempFolder&) = delete;
   TempFolder& operator=(const TempFolder&) = delete;
 
-  const std::filesystem::path& path() const { return path_; }
+  [[nodiscard]] const std::filesystem::path& path() const { return path_; }
 
  private:
   std::filesystem::path path_;

@@ -13,6 +13,7 @@
 #include "btf/data/import.h"
 #include "btf/image/image_io.h"
 #include "tests/support/btf_files.h"
+#include "tests/support/temp_folder.h"
 
 namespace tessera {
 namespace {
@@ -64,7 +65,7 @@ class ImportErrorsTest : public ::testing::Test {
     return std::string(status.message());
   }
 
-  ScratchFolder scratch_;
+  TempFolder scratch_;
 };
 
 std::string ManifestCsv(const std::string& records) {

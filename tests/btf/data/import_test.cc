@@ -15,6 +15,7 @@
 
 #include "tests/support/btf_files.h"
 #include "tests/support/read_btf.h"
+#include "tests/support/temp_folder.h"
 
 namespace tessera {
 namespace {
@@ -132,7 +133,7 @@ INSTANTIATE_TEST_SUITE_P(All, LayoutTest, ::testing::ValuesIn(LayoutCases()),
 
 TEST_P(LayoutTest, SamplesComeBackUnturnedAndUnflipped) {
   const auto btf = SmallBtf();
-  const ScratchFolder folder;
+  const TempFolder folder;
   const std::filesystem::path path = GetParam().write(*btf, folder.path());
   for (const ImportLayout layout : {ImportLayout::kAuto, GetParam().layout}) {
     auto source = ImportBtf(path, {.layout = layout}, RunContext{});
@@ -172,7 +173,7 @@ TEST_P(LayoutTest, LightsComeFromWhereTheShadingSaysTheyDo) {
   }
   const auto btf = MemoryBtf::Create(info, samples);
   ASSERT_TRUE(btf.ok());
-  const ScratchFolder folder;
+  const TempFolder folder;
   auto source = ImportBtf(GetParam().write(**btf, folder.path()), {}, RunContext{});
   ASSERT_TRUE(source.ok()) << source.status();
   const std::vector<float> read = AllSamples(**source);
@@ -198,7 +199,7 @@ TEST(ImportTest, TransferScaleAndProvenanceAreApplied) {
   gray.at(1, 0, 0) = 255;
   CodeImage colour(2, 1, 3);
   colour.at(0, 0, 1) = 128;
-  const ScratchFolder folder;
+  const TempFolder folder;
   WriteFolder(
       {{"a.png", MakePng(gray, 8)},
        {"b.png", MakePng(colour, 8)},
@@ -236,7 +237,7 @@ TEST(ImportTest, ImagesOfSeveralTypesAreStoredAsLinearValues) {
   FileMap files = ManifestFiles(*btf, TestImageKind::kPng8, ManifestKind::kCsv);
   files["images/1_0.png"] = MakeBtfImage(*btf, 0, 1, TestImageKind::kExrFloat);  // the bytes say what it is
   files["images/2_0.png"] = MakeBtfImage(*btf, 0, 2, TestImageKind::kPng16);
-  const ScratchFolder folder;
+  const TempFolder folder;
   WriteFolder(files, folder.path());
   const auto source = ImportBtf(folder.path(), {}, RunContext{});
   ASSERT_TRUE(source.ok()) << source.status();
@@ -246,7 +247,7 @@ TEST(ImportTest, ImagesOfSeveralTypesAreStoredAsLinearValues) {
 
 TEST(ImportTest, EveryBudgetAndNumberOfThreadsGivesTheSameSamples) {
   const auto btf = AsymmetricBtf(72, 50, WholeDegreeDirections(1, 8), WholeDegreeDirections(2, 10));
-  const ScratchFolder folder;
+  const TempFolder folder;
   WriteZip(Ubo2003Files(*btf, TestImageKind::kPng8, ""), folder.path() / "a.zip", ZipPacking::kDeflated);
   std::vector<float> first;
   for (const uint64_t budget : {uint64_t{512} << 20, uint64_t{5} << 20, kMinImportBudgetBytes}) {
@@ -268,7 +269,7 @@ TEST(ImportTest, EveryBudgetAndNumberOfThreadsGivesTheSameSamples) {
 TEST(ImportTest, ImagesBeyondTheBudgetAreReadInBands) {
   const auto btf = AsymmetricBtf(640, 600, {{0.0, 0.0}}, WholeDegreeDirections(1, 3));  // 1.15 MB an image
   for (const TestImageKind kind : {TestImageKind::kPng8, TestImageKind::kExrFloat}) {
-    const ScratchFolder folder;
+    const TempFolder folder;
     WriteFolder(Ubo2003Files(*btf, kind, ""), folder.path());
     auto source = ImportBtf(folder.path(), {.memory_budget_bytes = kMinImportBudgetBytes}, RunContext{});
     ASSERT_TRUE(source.ok()) << source.status();
@@ -278,7 +279,7 @@ TEST(ImportTest, ImagesBeyondTheBudgetAreReadInBands) {
 
 TEST(ImportTest, ReadRowsChecksItsArguments) {
   const auto btf = SmallBtf();
-  const ScratchFolder folder;
+  const TempFolder folder;
   WriteFolder(Ubo2003Files(*btf, TestImageKind::kPng8, ""), folder.path());
   auto source = ImportBtf(folder.path(), {}, RunContext{});
   ASSERT_TRUE(source.ok());

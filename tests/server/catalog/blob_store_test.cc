@@ -7,7 +7,7 @@
 
 #include "proto/wire/status.h"
 #include "tests/server/support/open_catalog.h"
-#include "tests/server/support/temporary_folder.h"
+#include "tests/support/temp_folder.h"
 
 namespace tessera {
 namespace {
@@ -43,7 +43,7 @@ class BlobStoreTest : public testing::Test {
     return session.Commit();
   }
 
-  TemporaryFolder folder_;
+  TempFolder folder_;
   std::unique_ptr<OpenCatalog> catalog_ = std::make_unique<OpenCatalog>(folder_.path());
 };
 

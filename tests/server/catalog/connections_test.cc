@@ -9,7 +9,7 @@
 #include "server/catalog/migrations.h"
 #include "server/catalog/storage_error.h"
 #include "tests/server/support/open_catalog.h"
-#include "tests/server/support/temporary_folder.h"
+#include "tests/support/temp_folder.h"
 
 namespace tessera {
 namespace {
@@ -21,7 +21,7 @@ absl::StatusOr<std::string> Scalar(Database& db, std::string_view sql) {
 }
 
 TEST(ConnectionsTest, TheWriterIsDurableAndTablesAreStrict) {
-  TemporaryFolder folder;
+  TempFolder folder;
   OpenCatalog catalog(folder.path());
   ASSERT_TRUE(
       catalog.connections
@@ -40,7 +40,7 @@ TEST(ConnectionsTest, TheWriterIsDurableAndTablesAreStrict) {
 }
 
 TEST(ConnectionsTest, AFailedWriteLeavesNothing) {
-  TemporaryFolder folder;
+  TempFolder folder;
   OpenCatalog catalog(folder.path());
   const std::string insert = "INSERT INTO requests VALUES ('id', 'hash', x'00', 1)";
   EXPECT_FALSE(catalog.connections
@@ -58,7 +58,7 @@ TEST(ConnectionsTest, AFailedWriteLeavesNothing) {
 }
 
 TEST(ConnectionsTest, ReadersCannotWrite) {
-  TemporaryFolder folder;
+  TempFolder folder;
   OpenCatalog catalog(folder.path());
   const absl::Status status = catalog.connections->Read(
       [](Database& db) { return db.Run("INSERT INTO requests VALUES ('id', 'hash', x'00', 1)"); });
@@ -66,7 +66,7 @@ TEST(ConnectionsTest, ReadersCannotWrite) {
 }
 
 TEST(MigrationsTest, OlderCatalogsAreBroughtUpAndNewerOnesRefused) {
-  TemporaryFolder folder;
+  TempFolder folder;
   auto db = Database::Open(folder.path() / "c.sqlite", OpenMode::kReadWrite);
   ASSERT_TRUE(db.ok()) << db.status();
   const std::string_view first[] = {"CREATE TABLE a (x INTEGER) STRICT;"};
@@ -84,7 +84,7 @@ TEST(MigrationsTest, OlderCatalogsAreBroughtUpAndNewerOnesRefused) {
 }
 
 TEST(MigrationsTest, AFailedMigrationChangesNothing) {
-  TemporaryFolder folder;
+  TempFolder folder;
   auto db = Database::Open(folder.path() / "c.sqlite", OpenMode::kReadWrite);
   const std::string_view scripts[] = {
       "CREATE TABLE a (x INTEGER) STRICT; CREATE TABLE a (x INTEGER) STRICT;"};
@@ -94,7 +94,7 @@ TEST(MigrationsTest, AFailedMigrationChangesNothing) {
 }
 
 TEST(MigrationsTest, AServerDoesNotOpenANewerCatalog) {
-  TemporaryFolder folder;
+  TempFolder folder;
   const auto file = folder.path() / "catalog.sqlite";
   {
     auto db = Database::Open(file, OpenMode::kReadWrite);
@@ -104,7 +104,7 @@ TEST(MigrationsTest, AServerDoesNotOpenANewerCatalog) {
 }
 
 TEST(StorageErrorTest, AFullDatabaseIsStorageFull) {
-  TemporaryFolder folder;
+  TempFolder folder;
   OpenCatalog catalog(folder.path());
   const std::string big(1 << 20, 'x');
   const absl::Status status = catalog.connections->Write([&](Database& db) -> absl::Status {
@@ -116,7 +116,7 @@ TEST(StorageErrorTest, AFullDatabaseIsStorageFull) {
 }
 
 TEST(StorageErrorTest, ADamagedCatalogIsDataLoss) {
-  TemporaryFolder folder;
+  TempFolder folder;
   std::ofstream(folder.path() / "catalog.sqlite") << std::string(8192, 'x');
   EXPECT_EQ(Connections::Open(folder.path() / "catalog.sqlite").status().code(), absl::StatusCode::kDataLoss);
 }

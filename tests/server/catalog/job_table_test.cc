@@ -4,7 +4,7 @@
 
 #include "proto/wire/status.h"
 #include "tests/server/support/open_catalog.h"
-#include "tests/server/support/temporary_folder.h"
+#include "tests/support/temp_folder.h"
 
 namespace tessera {
 namespace {
@@ -36,7 +36,7 @@ class JobTableTest : public testing::Test {
         [&](Database& db) { return RecoverJobs(db, lease_before_ms, catalog_.now_ms); });
   }
 
-  TemporaryFolder folder_;
+  TempFolder folder_;
   OpenCatalog catalog_{folder_.path()};
 };
 

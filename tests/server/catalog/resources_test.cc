@@ -4,7 +4,7 @@
 
 #include "proto/wire/status.h"
 #include "tests/server/support/open_catalog.h"
-#include "tests/server/support/temporary_folder.h"
+#include "tests/support/temp_folder.h"
 
 namespace tessera {
 namespace {
@@ -24,7 +24,7 @@ class ResourcesTest : public testing::Test {
         [&](Database& db) { return PutTileSet(db, id, sha256, {}, OnTaken::kRefuse, catalog_.now_ms); });
   }
 
-  TemporaryFolder folder_;
+  TempFolder folder_;
   OpenCatalog catalog_{folder_.path()};
   std::string blob_ = *catalog_.blobs->Put("one");
   std::string other_blob_ = *catalog_.blobs->Put("two");

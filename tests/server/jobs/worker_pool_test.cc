@@ -10,7 +10,7 @@
 
 #include "proto/wire/status.h"
 #include "tests/server/support/open_catalog.h"
-#include "tests/server/support/temporary_folder.h"
+#include "tests/support/temp_folder.h"
 
 namespace tessera {
 namespace {
@@ -108,7 +108,7 @@ class WorkerPoolTest : public testing::Test {
     return catalog_.Write<v1::Material>([&](Database& db) { return GetMaterial(db, name); });
   }
 
-  TemporaryFolder folder_;
+  TempFolder folder_;
   OpenCatalog catalog_{folder_.path()};
   JobEvents events_;
   std::atomic<int> num_runs_ = 0;
