@@ -3,10 +3,10 @@
 #include <algorithm>
 #include <mutex>
 
-#include <absl/strings/cord.h>
 #include <absl/strings/str_format.h>
 
 #include "btf/base/parallel.h"
+#include "btf/base/reason.h"
 #include "btf/base/rng.h"
 #include "btf/base/status_macros.h"
 #include "btf/tiles/frames.h"
@@ -24,11 +24,6 @@ constexpr int kLargestTile = 16384;
 constexpr int kTilesPerGroup = 8;
 
 enum SeedStage : uint64_t { kCornerSeed = 1, kStripSeed = 2, kTileSeed = 3 };
-
-absl::Status WithReason(absl::Status status, absl::string_view reason) {
-  status.SetPayload(kReasonPayload, absl::Cord(reason));
-  return status;
-}
 
 absl::Status CheckReached(const FillReport& report, const SynthesisParams& params, absl::string_view what) {
   if (report.reached || params.force) {

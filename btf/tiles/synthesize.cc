@@ -4,10 +4,10 @@
 #include <string>
 #include <vector>
 
-#include <absl/strings/cord.h>
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_format.h>
 
+#include "btf/base/reason.h"
 #include "btf/base/status_macros.h"
 #include "btf/codec/codec.h"
 #include "btf/tiles/anisotropy.h"
@@ -118,13 +118,13 @@ absl::StatusOr<TileSet> SynthesizeTileSet(const Material& material, const Arrang
   const Anisotropy anisotropy = MeasureAnisotropy(exemplar, context);
   TESSERA_RETURN_IF_ERROR(context.CheckStop());
   if (arrangement.turned_strips && anisotropy.figure() > kAnisotropyLimit && !params.force) {
-    absl::Status status = absl::FailedPreconditionError(absl::StrFormat(
-        "material is not isotropic: anisotropy %.2f (pattern %.2f, mean reflectance %.2f), limit %.2f for "
-        "'%s', whose "
-        "strips are turned",
-        anisotropy.figure(), anisotropy.pattern, anisotropy.mean, kAnisotropyLimit, arrangement.id));
-    status.SetPayload(kReasonPayload, absl::Cord("NOT_ISOTROPIC"));
-    return status;
+    return WithReason(
+        absl::FailedPreconditionError(absl::StrFormat("material is not isotropic: anisotropy %.2f (pattern "
+                                                      "%.2f, mean reflectance %.2f), limit %.2f for "
+                                                      "'%s', whose strips are turned",
+                                                      anisotropy.figure(), anisotropy.pattern,
+                                                      anisotropy.mean, kAnisotropyLimit, arrangement.id)),
+        "NOT_ISOTROPIC");
   }
 
   TESSERA_ASSIGN_OR_RETURN(const IndexMaps maps, SynthesizeIndexMaps(exemplar, arrangement, params, context));

@@ -8,6 +8,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "btf/base/reason.h"
 #include "btf/tiles/frames.h"
 #include "btf/tiles/tile_sides.h"
 #include "tests/btf/tiles/noise_exemplar.h"
@@ -177,7 +178,7 @@ TEST(IndexMapsTest, RefusesSizesNamingTheLimit) {
   params = SmallParams();
   const absl::Status small = CheckSizes(64, 31, params);
   EXPECT_THAT(small.message(), HasSubstr("64x31"));
-  EXPECT_EQ(small.GetPayload(kReasonPayload), "MATERIAL_TOO_SMALL");
+  EXPECT_EQ(ReasonOf(small), "MATERIAL_TOO_SMALL");
   params = {.tile_size = 128, .strip_height = 40};
   EXPECT_THAT(CheckSizes(79, 128, params).message(), HasSubstr("at least 80x80"));
   EXPECT_TRUE(CheckSizes(80, 80, params).ok());
@@ -190,7 +191,7 @@ TEST(IndexMapsTest, SaysWhichStripMissedItsThresholdAndByHowMuch) {
   const absl::StatusOr<IndexMaps> maps =
       SynthesizeIndexMaps(exemplar, **FindArrangement("plane-16"), params, RunContext{});
   ASSERT_EQ(maps.status().code(), absl::StatusCode::kFailedPrecondition);
-  EXPECT_EQ(maps.status().GetPayload(kReasonPayload), "THRESHOLD_NOT_REACHED");
+  EXPECT_EQ(ReasonOf(maps.status()), "THRESHOLD_NOT_REACHED");
   EXPECT_THAT(std::string(maps.status().message()), HasSubstr("strip 0"));
   EXPECT_THAT(std::string(maps.status().message()), HasSubstr("limit 0.00"));
 }

@@ -8,6 +8,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "btf/base/reason.h"
 #include "btf/codec/codec.h"
 #include "btf/data/direction_sets.h"
 #include "btf/data/memory_btf.h"
@@ -117,7 +118,7 @@ TEST(SynthesizeTileSetTest, RefusesToTurnStripesUnlessForced) {
   params.mean_threshold = params.texel_threshold = 100.0;
   const absl::StatusOr<TileSet> refused = SynthesizeTileSet(material, surface, params, RunContext{});
   ASSERT_EQ(refused.status().code(), absl::StatusCode::kFailedPrecondition);
-  EXPECT_EQ(refused.status().GetPayload(kReasonPayload), "NOT_ISOTROPIC");
+  EXPECT_EQ(ReasonOf(refused.status()), "NOT_ISOTROPIC");
   EXPECT_THAT(std::string(refused.status().message()), HasSubstr("limit"));
   EXPECT_TRUE(SynthesizeTileSet(material, **FindArrangement("plane-16"), params, RunContext{}).ok());
   params.force = true;
