@@ -1,7 +1,8 @@
 #include "client/lib/atomic_file.h"
 
+#include <atomic>
 #include <cerrno>
-#include <cstdlib>
+#include <cstdint>
 #include <cstring>
 #include <utility>
 
@@ -56,16 +57,18 @@ absl::StatusOr<AtomicFile> AtomicFile::Create(const std::filesystem::path& path)
   if (std::filesystem::is_directory(path, ignored)) {
     return FileError(EISDIR, "writing", path);
   }
-  std::string temporary = path.string() + ".XXXXXX";
-  const int descriptor = ::mkostemp(temporary.data(), O_CLOEXEC);
-  if (descriptor < 0) {
-    return FileError(errno, "creating", path);
+  // Not mkostemp: its files are private, and the umask cannot be read without setting it for every thread.
+  static std::atomic<uint64_t> counter = 0;
+  for (;;) {
+    std::string temporary = absl::StrCat(path.string(), ".", ::getpid(), ".", counter.fetch_add(1), ".tmp");
+    const int descriptor = ::open(temporary.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
+    if (descriptor >= 0) {
+      return AtomicFile(descriptor, path, std::move(temporary));
+    }
+    if (errno != EEXIST) {
+      return FileError(errno, "creating", path);
+    }
   }
-  // mkostemp makes the file private; give it what an ordinary new file gets.
-  const mode_t mask = ::umask(0);
-  ::umask(mask);
-  ::fchmod(descriptor, 0666 & ~mask);
-  return AtomicFile(descriptor, path, std::move(temporary));
 }
 
 absl::Status AtomicFile::Write(std::string_view bytes) {

@@ -1,6 +1,7 @@
 #include "client/lib/atomic_file.h"
 
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 
 #include "tests/support/temp_folder.h"
 
@@ -46,6 +47,18 @@ TEST(AtomicFileTest, NamesThePathAndTheReason) {
   EXPECT_TRUE(absl::IsInvalidArgument(WriteFileAtomically(folder.path(), "x")));
   EXPECT_TRUE(absl::IsNotFound(ReadWholeFile(folder.path() / "none").status()));
   EXPECT_TRUE(absl::IsInvalidArgument(ReadWholeFile(folder.path()).status()));
+}
+
+TEST(AtomicFileTest, GivesTheModeOfTheUmask) {
+  const TempFolder folder;
+  const fs::path path = folder.path() / "out.bin";
+  const mode_t old_mask = umask(027);
+  EXPECT_TRUE(WriteFileAtomically(path, "x").ok());
+  EXPECT_EQ(fs::status(path).permissions(), fs::perms{0640});
+  umask(077);
+  EXPECT_TRUE(WriteFileAtomically(path, "y").ok());
+  EXPECT_EQ(fs::status(path).permissions(), fs::perms{0600});
+  EXPECT_EQ(umask(old_mask), mode_t{077});
 }
 
 }  // namespace
