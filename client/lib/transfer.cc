@@ -7,12 +7,14 @@
 
 #include <absl/strings/str_cat.h>
 #include <fcntl.h>
+#include <sys/mman.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
 #include "btf/base/sha256.h"
 #include "btf/base/status_macros.h"
 #include "client/lib/atomic_file.h"
+#include "client/lib/background_sha256.h"
 #include "client/lib/blob_cache.h"
 #include "client/lib/client.h"
 #include "client/lib/stubs.h"
@@ -21,6 +23,8 @@ namespace tessera {
 namespace {
 
 constexpr uint64_t kChunkBytes = 1 << 20;  // tessera.proto: at most 1 MiB
+// The announced size of a blob is only a hint until its bytes are here.
+constexpr uint64_t kLargestReserve = uint64_t{1} << 30;
 
 // `count` bytes from `offset` on, into `chunk`.
 using ReadAt = std::function<absl::Status(uint64_t offset, uint64_t count, std::string& chunk)>;
@@ -85,7 +89,8 @@ absl::Status Upload(v1::Blobs::Stub& blobs, const v1::Blob& blob, const ReadAt& 
   }
 }
 
-using Sink = std::function<absl::Status(std::string_view bytes)>;
+// May take the bytes away: what is left in `chunk` is overwritten.
+using Sink = std::function<absl::Status(std::string& chunk)>;
 
 // Streams the bytes of `blob` from `offset` on to `sink`, across lost connections, and checks the size.
 absl::Status Download(v1::Blobs::Stub& blobs, const v1::Blob& blob, uint64_t offset, const Sink& sink,
@@ -107,7 +112,7 @@ absl::Status Download(v1::Blobs::Stub& blobs, const v1::Blob& blob, uint64_t off
         return absl::DataLossError(absl::StrCat("blob ", blob.sha256(), ": more than the ", blob.size_bytes(),
                                                 " bytes it should have"));
       }
-      if (absl::Status local = sink(chunk.data()); !local.ok()) {
+      if (absl::Status local = sink(*chunk.mutable_data()); !local.ok()) {
         call.rpc()->TryCancel();
         (void)stream->Finish();
         return local;
@@ -129,6 +134,30 @@ absl::Status Download(v1::Blobs::Stub& blobs, const v1::Blob& blob, uint64_t off
     }
     TESSERA_RETURN_IF_ERROR(backoff.Wait(status));
   }
+}
+
+// Room for the blob, in large pages where the system has them: a page fault for every 4 KiB received shows.
+void Reserve(const v1::Blob& blob, std::string& bytes) {
+  bytes.reserve(std::min(blob.size_bytes(), kLargestReserve));
+#ifdef MADV_HUGEPAGE
+  constexpr uintptr_t kPageBytes = uintptr_t{2} << 20;
+  const auto begin = reinterpret_cast<uintptr_t>(bytes.data());
+  const uintptr_t first = (begin + kPageBytes - 1) / kPageBytes * kPageBytes;
+  const uintptr_t last = (begin + bytes.capacity()) / kPageBytes * kPageBytes;
+  if (first < last) {
+    (void)::madvise(reinterpret_cast<void*>(first), last - first, MADV_HUGEPAGE);  // a wish
+  }
+#endif
+}
+
+// Appends and leaves the hashing to the other thread; `bytes` outlives `digest`.
+void AppendAndHash(std::string_view chunk, std::string& bytes, BackgroundSha256& digest) {
+  if (bytes.capacity() - bytes.size() < chunk.size()) {
+    digest.Wait();  // the bytes move
+  }
+  const size_t begin = bytes.size();
+  bytes.append(chunk);
+  digest.Add(std::string_view(bytes).substr(begin));
 }
 
 absl::Status CheckDigest(const v1::Blob& blob, std::string_view digest) {
@@ -257,16 +286,13 @@ absl::StatusOr<v1::Blob> Client::UploadFile(const std::filesystem::path& path, c
 }
 
 absl::StatusOr<std::string> Client::ReadBlob(const v1::Blob& blob, const RunContext& context) {
-  // The announced size is only a hint until the bytes are here.
-  constexpr uint64_t kLargestReserve = uint64_t{1} << 30;
   std::string bytes;
-  bytes.reserve(std::min(blob.size_bytes(), kLargestReserve));
-  Sha256 digest;
+  Reserve(blob, bytes);
+  BackgroundSha256 digest;
   TESSERA_RETURN_IF_ERROR(Download(
       *stubs_->blobs, blob, 0,
-      [&](std::string_view chunk) {
-        digest.Update(BytesOf(chunk));
-        bytes.append(chunk);
+      [&](std::string& chunk) {
+        AppendAndHash(chunk, bytes, digest);
         return absl::OkStatus();
       },
       options_.retry, context));
@@ -277,12 +303,15 @@ absl::StatusOr<std::string> Client::ReadBlob(const v1::Blob& blob, const RunCont
 absl::Status Client::DownloadFile(const v1::Blob& blob, const std::filesystem::path& path,
                                   const RunContext& context) {
   TESSERA_ASSIGN_OR_RETURN(AtomicFile file, AtomicFile::Create(path));
-  Sha256 digest;
+  std::string hashed;  // outlives the digest that reads it
+  BackgroundSha256 digest;
   TESSERA_RETURN_IF_ERROR(Download(
       *stubs_->blobs, blob, 0,
-      [&](std::string_view chunk) {
-        digest.Update(BytesOf(chunk));
-        return file.Write(chunk);
+      [&](std::string& chunk) {
+        digest.Wait();
+        hashed.swap(chunk);
+        digest.Add(hashed);
+        return file.Write(hashed);
       },
       options_.retry, context));
   TESSERA_RETURN_IF_ERROR(CheckDigest(blob, digest.HexDigest()));
@@ -302,13 +331,13 @@ absl::StatusOr<std::string> Client::FetchBlob(const v1::Blob& blob, const RunCon
   std::string bytes = earlier.ok() && earlier->size() <= blob.size_bytes() ? *std::move(earlier) : "";
   bool caching = !bytes.empty() || partial->Clear().ok();
   const bool resumed = !bytes.empty();
-  Sha256 digest;
-  digest.Update(BytesOf(bytes));
+  Reserve(blob, bytes);
+  BackgroundSha256 digest;
+  digest.Add(bytes);
   TESSERA_RETURN_IF_ERROR(Download(
       *stubs_->blobs, blob, bytes.size(),
-      [&](std::string_view chunk) {
-        digest.Update(BytesOf(chunk));
-        bytes.append(chunk);
+      [&](std::string& chunk) {
+        AppendAndHash(chunk, bytes, digest);
         caching = caching && partial->Append(chunk).ok();
         return absl::OkStatus();
       },

@@ -30,7 +30,7 @@ using Clock = std::chrono::steady_clock;
 
 constexpr double kLeastShareOfBareStream = 0.5;
 constexpr double kMostRedressMs = 10.0;
-constexpr int kRounds = 9;
+constexpr int kRounds = 31;
 constexpr size_t kChunkBytes = 1 << 20;
 
 double SecondsSince(Clock::time_point begin) {
@@ -142,6 +142,7 @@ absl::StatusOr<bool> Run() {
 
   std::vector<double> bare_s;
   std::vector<double> download_s;
+  std::vector<double> shares;  // of one round: both met the same neighbours on the machine
   for (int round = 0; round <= kRounds; ++round) {
     auto begin = Clock::now();
     TESSERA_RETURN_IF_ERROR(ReadBare(*stub).status());
@@ -155,11 +156,12 @@ absl::StatusOr<bool> Run() {
     if (round > 0) {  // the first one warms up
       bare_s.push_back(bare_seconds);
       download_s.push_back(download_seconds);
+      shares.push_back(bare_seconds / download_seconds);
     }
   }
   bare_server->Shutdown();
   const double megabytes = static_cast<double>(bytes.size()) / 1e6;
-  const double share = Median(bare_s) / Median(download_s);
+  const double share = Median(shares);
 
   TESSERA_ASSIGN_OR_RETURN(const QuadMesh torus, BuiltinShape("torus"));
   TESSERA_ASSIGN_OR_RETURN(const Arrangement* arrangement, FindArrangement("surface-96"));
@@ -171,12 +173,15 @@ absl::StatusOr<bool> Run() {
     redress_ms.push_back(1e3 * SecondsSince(begin));
   }
 
-  std::printf("figure,value,unit,limit\n");
-  std::printf("size,%.1f,MB,\n", megabytes);
-  std::printf("bare_stream,%.0f,MB/s,\n", megabytes / Median(bare_s));
-  std::printf("download,%.0f,MB/s,\n", megabytes / Median(download_s));
-  std::printf("download_share_of_bare_stream,%.2f,,>=%.2f\n", share, kLeastShareOfBareStream);
-  std::printf("redress,%.3f,ms,<%.0f\n", Median(redress_ms), kMostRedressMs);
+  const auto verdict = [](bool reached) { return reached ? "ok" : "MISSED"; };
+  std::printf("name,value,unit,limit,verdict\n");
+  std::printf("size,%.1f,MB,,\n", megabytes);
+  std::printf("bare_stream,%.0f,MB/s,,\n", megabytes / Median(bare_s));
+  std::printf("download,%.0f,MB/s,,\n", megabytes / Median(download_s));
+  std::printf("download_share_of_bare_stream,%.2f,,>=%.2f,%s\n", share, kLeastShareOfBareStream,
+              verdict(share >= kLeastShareOfBareStream));
+  std::printf("redress,%.3f,ms,<%.0f,%s\n", Median(redress_ms), kMostRedressMs,
+              verdict(Median(redress_ms) < kMostRedressMs));
   return share >= kLeastShareOfBareStream && Median(redress_ms) < kMostRedressMs;
 }
 
