@@ -16,9 +16,11 @@ namespace {
 constexpr int kStarts = 8;       // random starts
 constexpr int kSweeps = 4;       // over all samples; the last is greedy
 constexpr int kCandidates = 80;  // cut for each sample and sweep
-// What a set of samples costs: the mean mismatch of its cuts in mean steps, plus these prices. A sample
-// wholly inside another one, on average over the samples:
-constexpr double kOverlapPrice = 1.0;
+// What a set of samples costs: the mean mismatch of its cuts in mean steps, plus these prices, each on
+// average over the samples. Two samples from one place, falling to 0 where they are a strip height apart.
+// Dear enough that no cut is worth it: a set cut from one patch has no seams at all, and every tile looks
+// alike.
+constexpr double kNearnessPrice = 6.0;
 // A sample that stands out: the squared distance of its mean from the exemplar's, against that of a sample
 // drawn at random, and the absolute logarithm of its variance against the same. Every vertex of a dressed
 // mesh shows corner samples, so one that is bland or striking would draw the grid.
@@ -109,22 +111,28 @@ CornerCut CutPair(const Exemplar& exemplar, const std::vector<Patch>& samples, c
   return cut;
 }
 
-// Share of a sample that another one covers in the unturned exemplar.
-double Overlap(const Exemplar& exemplar, const Patch& a, const Patch& b, int strip_height) {
-  const auto rectangle = [&](const Patch& patch) {
-    const uint32_t first = BtfelOfTexel(exemplar.TexelAt(patch.turn, patch.u, patch.v));
-    const uint32_t last = BtfelOfTexel(
-        exemplar.TexelAt(patch.turn, patch.u + strip_height / 2 - 1, patch.v + strip_height - 1));
-    const int width = exemplar.width();
-    const auto [x0, x1] = std::minmax<int>(first % width, last % width);
-    const auto [y0, y1] = std::minmax<int>(first / width, last / width);
-    return std::array<int, 4>{x0, y0, x1, y1};
-  };
-  const auto p = rectangle(a);
-  const auto q = rectangle(b);
-  const int w = std::min(p[2], q[2]) - std::max(p[0], q[0]) + 1;
-  const int h = std::min(p[3], q[3]) - std::max(p[1], q[1]) + 1;
-  return w <= 0 || h <= 0 ? 0.0 : static_cast<double>(w) * h / (strip_height * strip_height / 2);
+// Twice the middle of a sample in the unturned exemplar, so that it is whole.
+std::array<int, 2> TwiceMiddle(const Exemplar& exemplar, const Patch& patch, int strip_height) {
+  const auto first = static_cast<int>(BtfelOfTexel(exemplar.TexelAt(patch.turn, patch.u, patch.v)));
+  const auto last = static_cast<int>(
+      BtfelOfTexel(exemplar.TexelAt(patch.turn, patch.u + strip_height / 2 - 1, patch.v + strip_height - 1)));
+  const int width = exemplar.width();
+  return {first % width + last % width, first / width + last / width};
+}
+
+// How near two samples lie in the exemplar, whatever their turns: 1 in one place, 0 a strip height apart.
+double Nearness(const Exemplar& exemplar, const Patch& a, const Patch& b, int strip_height) {
+  const auto p = TwiceMiddle(exemplar, a, strip_height);
+  const auto q = TwiceMiddle(exemplar, b, strip_height);
+  const int distance = std::max(std::abs(p[0] - q[0]), std::abs(p[1] - q[1]));
+  return std::max(0.0, 1.0 - distance / (2.0 * strip_height));
+}
+
+// Texels around a sample that must lie in the exemplar: strips go on beyond their samples, and what lies
+// there is compared along the cuts, so a place at the rim would look cheaper than it is. Small exemplars have
+// less.
+int Margin(int exemplar_side, int sample_side, int strip_height) {
+  return std::min(strip_height / 2, (exemplar_side - sample_side) / 4);
 }
 
 // One start: state and improvement of all samples.
@@ -158,6 +166,9 @@ class CornerSearch {
     std::vector<Patch> patches = {before};
     std::vector<double> costs = {CostAround(sample)};
     for (const Candidate& candidate : candidates) {
+      if (!KeepsMargin(candidate.patch)) {
+        continue;
+      }
       samples_[sample] = candidate.patch;
       patches.push_back(candidate.patch);
       costs.push_back(CostAround(sample));
@@ -235,15 +246,15 @@ class CornerSearch {
   }
 
   [[nodiscard]] double Price(int sample) const {
-    double overlap = 0.0;
+    double nearness = 0.0;
     for (int other = 0; other < num_samples(); ++other) {
       if (other != sample) {
-        overlap += Overlap(exemplar_, samples_[sample], samples_[other], strip_height_);
+        nearness += Nearness(exemplar_, samples_[sample], samples_[other], strip_height_);
       }
     }
     const Statistics statistics = Measure(samples_[sample]);
     constexpr double kTiny = 1e-12;  // of a constant exemplar
-    return kOverlapPrice * overlap +
+    return kNearnessPrice * nearness +
            kMeanPrice * statistics.mean_distance / (typical_.mean_distance + kTiny) +
            kVariancePrice * std::abs(std::log((statistics.variance + kTiny) / (typical_.variance + kTiny)));
   }
@@ -295,8 +306,22 @@ class CornerSearch {
 
   [[nodiscard]] Patch RandomPlace(const std::vector<int>& turns) {
     const int turn = turns[rng_.NextBelow(turns.size())];
-    return {turn, static_cast<int>(rng_.NextBelow(exemplar_.TurnedWidth(turn) - strip_height_ / 2 + 1)),
-            static_cast<int>(rng_.NextBelow(exemplar_.TurnedHeight(turn) - strip_height_ + 1))};
+    const auto place = [&](int exemplar_side, int sample_side) {
+      const int margin = Margin(exemplar_side, sample_side, strip_height_);
+      return margin + static_cast<int>(rng_.NextBelow(exemplar_side - sample_side - 2 * margin + 1));
+    };
+    const int u = place(exemplar_.TurnedWidth(turn), strip_height_ / 2);
+    const int v = place(exemplar_.TurnedHeight(turn), strip_height_);
+    return {turn, u, v};
+  }
+
+  [[nodiscard]] bool KeepsMargin(const Patch& patch) const {
+    const auto keeps = [&](int at, int exemplar_side, int sample_side) {
+      const int margin = Margin(exemplar_side, sample_side, strip_height_);
+      return at >= margin && at + sample_side + margin <= exemplar_side;
+    };
+    return keeps(patch.u, exemplar_.TurnedWidth(patch.turn), strip_height_ / 2) &&
+           keeps(patch.v, exemplar_.TurnedHeight(patch.turn), strip_height_);
   }
 
   [[nodiscard]] size_t Draw(const std::vector<double>& costs, double best) {

@@ -1,13 +1,15 @@
 // Step 1 of synthesis: the two end samples of every strip, chosen together, and the cuts between those that
 // meet.
 //
+// clang-format off
 //        j ^  in          At a corner of a tile, side `in` ends and side `out` starts. Seen with `out` lying
-//        along
-//          | +----+       the bottom, both cover the h/2 x h/2 square at the vertex; i counts along `out`, j
-//          up. | |in /|       A cut from the vertex to the opposite corner of the square parts them. It is
-//          pinned: row | |  / |       j = 0 shows `out`, column i = 0 above it shows `in`, the texel at the
-//          vertex `out`. | | /  | | |/out|
+//          | +----+       along the bottom, both cover the h/2 x h/2 square at the vertex; i counts along
+//          | |in /|       `out`, j up. A cut from the vertex to the opposite corner of the square parts them.
+//          | |  / |       It is pinned: row j = 0 shows `out`, column i = 0 above it shows `in`, the texel at
+//          | | /  |       the vertex `out`.
+//          | |/out|
 //          +-+----+---> i
+// clang-format on
 #pragma once
 
 #include <cstdint>
@@ -43,8 +45,8 @@ struct Corners {
 
 // Several random starts, each improved sample by sample: the best places for one sample against the mean of
 // all it meets come from a search, the choice among them from the true cuts, drawn at first and greedy at the
-// end. Samples that overlap in the exemplar pay for it, so that not one patch serves every corner. Errors:
-// CANCELLED.
+// end. Samples less than a strip height apart in the exemplar pay dearly for it, so that not one patch serves
+// every corner. Errors: CANCELLED.
 absl::StatusOr<Corners> ChooseCorners(const ExemplarSpectra& spectra, const Arrangement& arrangement,
                                       int strip_height, uint64_t seed, const RunContext& context);
 
