@@ -111,6 +111,24 @@ TEST(SynthesizeTileSetTest, EveryTexelIsABtfelOfTheMaterial) {
   EXPECT_GT(set->certificate["borders"]["verbatim_share"].get<double>(), 0.0);
 }
 
+TEST(SynthesizeTileSetTest, WritesTheSameBytesForAnyNumberOfThreads) {
+  const Material material = MakeMaterial(32, 32, Pattern::kBumps);
+  std::string one;
+  for (const int num_threads : {1, 2, 8}) {
+    RunContext context;
+    context.num_threads = num_threads;
+    const absl::StatusOr<TileSet> set =
+        SynthesizeTileSet(material, **FindArrangement("plane-16"), SmallParams(), context);
+    ASSERT_TRUE(set.ok()) << set.status();
+    const absl::StatusOr<std::string> bytes = SerializeTileSet(*set);
+    ASSERT_TRUE(bytes.ok()) << bytes.status();
+    if (one.empty()) {
+      one = *bytes;
+    }
+    EXPECT_TRUE(*bytes == one) << num_threads << " threads";
+  }
+}
+
 TEST(SynthesizeTileSetTest, RefusesToTurnStripesUnlessForced) {
   const Material material = MakeMaterial(32, 32, Pattern::kStripes);
   const Arrangement& surface = **FindArrangement("surface-96");

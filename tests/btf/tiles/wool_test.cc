@@ -1,0 +1,53 @@
+// Synthesis of a measured material, the wool of the University of Bonn [Sattler2003].
+#include <cmath>
+#include <string>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "btf/codec/codec.h"
+#include "btf/data/import.h"
+#include "btf/tiles/anisotropy.h"
+#include "btf/tiles/synthesize.h"
+#include "tests/support/test_data.h"
+
+namespace tessera {
+namespace {
+
+using testing::HasSubstr;
+
+constexpr char kWool[] = "btf/ubo2003_wool128/UBO_WOOL128_decoded.zip";
+
+TEST(WoolTilesTest, LiesInThePlaneAndIsNotTurned) {
+  TESSERA_REQUIRE_DATA(kWool);
+  const auto source = ImportBtf(TestData(kWool), {}, RunContext{});
+  ASSERT_TRUE(source.ok()) << source.status();
+  const absl::StatusOr<Material> wool =
+      FindCodec("dsh-cls")->Encode(**source, {.kl = 9, .kv = 9}, RunContext{});
+  ASSERT_TRUE(wool.ok()) << wool.status();
+  SynthesisParams params;
+  params.tile_size = 32;
+  params.strip_height = 16;
+
+  const absl::StatusOr<TileSet> turned =
+      SynthesizeTileSet(*wool, **FindArrangement("surface-96"), params, RunContext{});
+  ASSERT_EQ(turned.status().code(), absl::StatusCode::kFailedPrecondition);
+  EXPECT_THAT(std::string(turned.status().message()), HasSubstr("not isotropic: anisotropy "));
+  EXPECT_THAT(std::string(turned.status().message()), HasSubstr("limit"));
+
+  params.force = true;  // thresholds: the figures are what is looked at
+  const absl::StatusOr<TileSet> set =
+      SynthesizeTileSet(*wool, **FindArrangement("plane-16"), params, RunContext{});
+  ASSERT_TRUE(set.ok()) << set.status();
+  EXPECT_GT(set->metadata["anisotropy"]["figure"].get<double>(), kAnisotropyLimit);
+  for (const char* const part : {"borders", "insides"}) {
+    for (const char* const figure : {"ratio", "ratio_p95", "ratio_worst", "ratio_run_p95"}) {
+      const double value = set->certificate[part][figure].get<double>();
+      EXPECT_TRUE(std::isfinite(value) && value > 0.0) << part << " " << figure << " " << value;
+    }
+  }
+  EXPECT_GT(set->certificate["borders"]["cut_share"].get<double>(), 0.0) << "not one patch for all corners";
+}
+
+}  // namespace
+}  // namespace tessera
