@@ -60,8 +60,8 @@ struct PreviewScene {
 // face is black. Errors: INVALID_ARGUMENT (sizes, camera, lights, mesh, named with value and limit),
 // FAILED_PRECONDITION (arrangements differ), UNIMPLEMENTED (codec without GLSL), RESOURCE_EXHAUSTED (tables
 // beyond what GL holds), CANCELLED (looked at about three times a second), INTERNAL (GL). The context must
-// not be in use by another thread. Cost: about 0.4 s for a covered 640x480 of 25 x 25 coefficients on two
-// cores; the first picture of a codec's size on a context takes up to a second more.
+// not be in use by another thread. Cost: preview_bench prints it; the first picture of a codec's size on a
+// context also compiles its shaders.
 [[nodiscard]] absl::StatusOr<Image> RenderGl(OffscreenContext& context, const PreviewScene& scene,
                                              const RunContext& run_context);
 
