@@ -59,28 +59,8 @@ absl::Status ValidateRange(const char* name, int value, int low, int high) {
   return absl::OkStatus();
 }
 
-absl::Status Validate(const GenerateParams& params) {
-  const auto kinds = GeneratorKinds();
-  if (std::find(kinds.begin(), kinds.end(), params.kind) == kinds.end()) {
-    std::string known;
-    for (const std::string_view kind : kinds) {
-      known += (known.empty() ? "" : ", ") + std::string(kind);
-    }
-    return absl::InvalidArgumentError(
-        absl::StrCat("generator kind \"", params.kind, "\", expected one of ", known));
-  }
-  TESSERA_RETURN_IF_ERROR(ValidateRange("size", params.size, kMinSize, kMaxSize));
-  TESSERA_RETURN_IF_ERROR(ValidateDirections("view", params.views));
-  TESSERA_RETURN_IF_ERROR(ValidateDirections("light", params.lights));
-  TESSERA_RETURN_IF_ERROR(ValidateRange("area samples", params.area_samples, 1, kMaxAreaSamples));
-  TESSERA_RETURN_IF_ERROR(ValidateRange("bounces", params.bounces, 0, kMaxBounces));
+absl::Status ValidateImages(const GenerateParams& params) {
   const bool is_heightmap = params.kind == kHeightmap;
-  // An image's range is its own; MapsFromImages bounds what the scale makes of it.
-  if (!std::isfinite(params.height_scale_texels) || params.height_scale_texels < 0.0 ||
-      (!is_heightmap && params.height_scale_texels > params.size / 4.0)) {
-    return absl::InvalidArgumentError(absl::StrCat("height scale ", params.height_scale_texels,
-                                                   " texels, expected 0 to size / 4 = ", params.size / 4.0));
-  }
   if (is_heightmap && (!params.height || !params.colour)) {
     return absl::InvalidArgumentError(
         absl::StrCat("kind heightmap needs ", params.height ? "a colour" : "a height", " image"));
@@ -178,9 +158,35 @@ std::vector<std::string_view> GeneratorKinds() {
   return {"reactdiffuse", "holes", "wrinkles", "weave", kHeightmap};
 }
 
+absl::Status CheckGenerateParams(const GenerateParams& params) {
+  const auto kinds = GeneratorKinds();
+  if (std::find(kinds.begin(), kinds.end(), params.kind) == kinds.end()) {
+    std::string known;
+    for (const std::string_view kind : kinds) {
+      known += (known.empty() ? "" : ", ") + std::string(kind);
+    }
+    return absl::InvalidArgumentError(
+        absl::StrCat("generator kind \"", params.kind, "\", expected one of ", known));
+  }
+  TESSERA_RETURN_IF_ERROR(ValidateRange("size", params.size, kMinSize, kMaxSize));
+  TESSERA_RETURN_IF_ERROR(ValidateDirections("view", params.views));
+  TESSERA_RETURN_IF_ERROR(ValidateDirections("light", params.lights));
+  TESSERA_RETURN_IF_ERROR(ValidateRange("area samples", params.area_samples, 1, kMaxAreaSamples));
+  TESSERA_RETURN_IF_ERROR(ValidateRange("bounces", params.bounces, 0, kMaxBounces));
+  const bool is_heightmap = params.kind == kHeightmap;
+  // An image's range is its own; MapsFromImages bounds what the scale makes of it.
+  if (!std::isfinite(params.height_scale_texels) || params.height_scale_texels < 0.0 ||
+      (!is_heightmap && params.height_scale_texels > params.size / 4.0)) {
+    return absl::InvalidArgumentError(absl::StrCat("height scale ", params.height_scale_texels,
+                                                   " texels, expected 0 to size / 4 = ", params.size / 4.0));
+  }
+  return absl::OkStatus();
+}
+
 absl::StatusOr<std::unique_ptr<BtfSource>> GenerateBtf(const GenerateParams& params,
                                                        const RunContext& context) {
-  TESSERA_RETURN_IF_ERROR(Validate(params));
+  TESSERA_RETURN_IF_ERROR(CheckGenerateParams(params));
+  TESSERA_RETURN_IF_ERROR(ValidateImages(params));
   try {
     return Generate(params, context);
   } catch (const std::bad_alloc&) {

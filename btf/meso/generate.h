@@ -23,6 +23,7 @@
 #include <string_view>
 #include <vector>
 
+#include <absl/status/status.h>
 #include <absl/status/statusor.h>
 
 #include "btf/base/run_context.h"
@@ -58,6 +59,9 @@ struct GenerateParams {
 
 // The kinds GenerateBtf knows: reactdiffuse, holes, wrinkles, weave, heightmap.
 [[nodiscard]] std::vector<std::string_view> GeneratorKinds();
+
+// What can be known without the images: INVALID_ARGUMENT naming the parameter, its value and its range.
+[[nodiscard]] absl::Status CheckGenerateParams(const GenerateParams& params);
 
 // Makes the maps, then visibility and diffuse irradiance of every surface point under every light; ReadRows
 // traces the view rays. Same parameters, same samples, for any number of threads and any blocking of rows.

@@ -111,9 +111,7 @@ absl::StatusOr<TileSet> SynthesizeTileSet(const Material& material, const Arrang
   if (codec == nullptr) {
     return absl::InvalidArgumentError(absl::StrCat("unknown codec '", material.btfels.codec_id, "'"));
   }
-  context.Report("embedding", 0, 1, "sets");
   TESSERA_ASSIGN_OR_RETURN(const Embedding embedding, codec->Embed(material, kCutDims, context));
-  context.Report("embedding", 1, 1, "sets");
   const Exemplar exemplar(embedding);
   const Anisotropy anisotropy = MeasureAnisotropy(exemplar, context);
   TESSERA_RETURN_IF_ERROR(context.CheckStop());

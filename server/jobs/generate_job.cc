@@ -1,6 +1,5 @@
 #include "server/jobs/generate_job.h"
 
-#include <algorithm>
 #include <memory>
 #include <optional>
 #include <span>
@@ -63,16 +62,10 @@ std::vector<std::string> GenerateInputs(const v1::GenerateMaterialRequest& reque
 }
 
 absl::Status CheckGenerateRequest(const v1::GenerateMaterialRequest& request) {
-  const std::vector<std::string_view> kinds = GeneratorKinds();
-  if (std::find(kinds.begin(), kinds.end(), request.kind()) == kinds.end()) {
-    std::string known;
-    for (const std::string_view kind : kinds) {
-      known.append(known.empty() ? "" : ", ").append(kind);
-    }
-    return WithReason(
-        absl::InvalidArgumentError(absl::StrCat("unknown kind \"", request.kind(), "\", known: ", known)),
-        "ARGUMENT_INVALID", "kind");
-  }
+  v1::GenerateMaterialRequest filled = request;
+  FillDefaults(filled);
+  TESSERA_ASSIGN_OR_RETURN(const GenerateParams params, ParamsFromRequest(filled));
+  TESSERA_RETURN_IF_ERROR(CheckGenerateParams(params));
   const bool from_images = request.kind() == "heightmap";
   if (from_images && (request.height_sha256().empty() || request.colour_sha256().empty())) {
     return WithReason(absl::InvalidArgumentError("kind heightmap needs height_sha256 and colour_sha256"),
@@ -85,9 +78,6 @@ absl::Status CheckGenerateRequest(const v1::GenerateMaterialRequest& request) {
   for (const std::string& sha256 : GenerateInputs(request)) {
     TESSERA_RETURN_IF_ERROR(CheckDigest(sha256, "height_sha256, colour_sha256 or roughness_sha256"));
   }
-  v1::GenerateMaterialRequest filled = request;
-  FillDefaults(filled);
-  TESSERA_RETURN_IF_ERROR(ParamsFromRequest(filled).status());
   return CheckEncodeOptions(filled.encode());
 }
 

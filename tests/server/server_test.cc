@@ -251,6 +251,8 @@ TEST_F(ServerTest, WrongArgumentsAreRefusedBeforeAnyJob) {
   EXPECT_EQ(reason_of([](auto& request) { request.set_kind("velvet"); }), "ARGUMENT_INVALID");
   EXPECT_EQ(reason_of([](auto& request) { request.set_kind("heightmap"); }), "ARGUMENT_INVALID");
   EXPECT_EQ(reason_of([](auto& request) { request.set_lights("many"); }), "ARGUMENT_INVALID");
+  EXPECT_EQ(reason_of([](auto& request) { request.set_size(16); }), "ARGUMENT_INVALID");
+  EXPECT_EQ(reason_of([](auto& request) { request.set_size(100000); }), "ARGUMENT_INVALID");
   EXPECT_EQ(reason_of([](auto& request) { request.mutable_encode()->set_codec("jpeg"); }),
             "ARGUMENT_INVALID");
   EXPECT_EQ(reason_of([](auto& request) { request.set_name("materials/a/b"); }), "NAME_INVALID");
