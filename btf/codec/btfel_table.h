@@ -10,15 +10,18 @@
 
 #include <nlohmann/json.hpp>
 
+#include "btf/codec/container.h"
 #include "btf/data/btf_source.h"
 #include "btf/math/conventions.h"
 
 namespace tessera {
 
-// A named float32 table shared by all texels, row-major.
+// A named table shared by all texels, row-major.
 struct CodecTable {
   std::vector<int64_t> shape;
-  std::vector<float> values;
+  std::vector<float> values;  // finite
+  // As it is stored: f32, or u8 or u16 where every value is a whole number of that range.
+  DType dtype = DType::kF32;
 };
 
 // Quantised coefficient vectors with their shared tables. value = offset[i] + step[i] * code.

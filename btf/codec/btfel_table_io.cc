@@ -29,6 +29,63 @@ bool AllFinite(const std::vector<float>& values) {
   return std::ranges::all_of(values, [](float v) { return std::isfinite(v); });
 }
 
+template <typename T>
+absl::StatusOr<Section> WholeNumberSection(const std::string& name, const CodecTable& table) {
+  std::vector<T> values;
+  values.reserve(table.values.size());
+  for (const float v : table.values) {
+    if (!(v >= 0.0F && v <= std::numeric_limits<T>::max()) || v != std::floor(v)) {
+      return absl::InvalidArgumentError(absl::StrCat("codec table '", name, "': value ", v,
+                                                     ", expected a whole number up to ",
+                                                     std::numeric_limits<T>::max()));
+    }
+    values.push_back(static_cast<T>(v));
+  }
+  return MakeSection<T>(name, table.shape, std::span<const T>(values));
+}
+
+absl::StatusOr<Section> SectionOfTable(const std::string& name, const CodecTable& table) {
+  switch (table.dtype) {
+    case DType::kU8:
+      return WholeNumberSection<uint8_t>(name, table);
+    case DType::kU16:
+      return WholeNumberSection<uint16_t>(name, table);
+    case DType::kF32:
+      if (!AllFinite(table.values)) {
+        return absl::InvalidArgumentError(absl::StrCat("codec table '", name, "': a value is not finite"));
+      }
+      return MakeSection<float>(name, table.shape, std::span<const float>(table.values));
+    default:
+      return absl::InvalidArgumentError(absl::StrCat("codec table '", name, "': dtype ",
+                                                     std::string(DTypeName(table.dtype)),
+                                                     ", expected u8, u16 or f32"));
+  }
+}
+
+absl::StatusOr<CodecTable> TableOfSection(const Section& section) {
+  CodecTable table{section.shape, {}, section.dtype};
+  const auto take = [&table](const auto& values) { table.values.assign(values.begin(), values.end()); };
+  switch (section.dtype) {
+    case DType::kU8:
+      take(SectionValues<uint8_t>(section));
+      break;
+    case DType::kU16:
+      take(SectionValues<uint16_t>(section));
+      break;
+    case DType::kF32:
+      table.values = SectionValues<float>(section);
+      break;
+    default:
+      return absl::InvalidArgumentError(absl::StrCat("codec table '", section.name, "': dtype ",
+                                                     std::string(DTypeName(section.dtype)),
+                                                     ", expected u8, u16 or f32"));
+  }
+  if (!AllFinite(table.values)) {
+    return absl::InvalidArgumentError(absl::StrCat("section '", section.name, "': a value is not finite"));
+  }
+  return table;
+}
+
 absl::Status CheckQuantisation(const BtfelTable& table) {
   const size_t k = static_cast<size_t>(table.num_coefficients);
   if (table.num_coefficients < 1 || table.num_coefficients > kMaxCoefficients) {
@@ -126,9 +183,6 @@ absl::Status AddSharedTables(const BtfelTable& table, Container& container) {
         container.Find(name) != nullptr) {
       return absl::InvalidArgumentError(absl::StrCat("codec table '", name, "': the name is taken"));
     }
-    if (!AllFinite(codec_table.values)) {
-      return absl::InvalidArgumentError(absl::StrCat("codec table '", name, "': a value is not finite"));
-    }
     names.push_back(name);
   }
   container.header["codec"] = {{"id", table.codec_id},
@@ -141,8 +195,8 @@ absl::Status AddSharedTables(const BtfelTable& table, Container& container) {
   TESSERA_RETURN_IF_ERROR(AddDirections("views", table.views, container));
   TESSERA_RETURN_IF_ERROR(AddDirections("lights", table.lights, container));
   for (const auto& [name, codec_table] : table.tables) {
-    container.sections.push_back(
-        MakeSection<float>(name, codec_table.shape, std::span<const float>(codec_table.values)));
+    TESSERA_ASSIGN_OR_RETURN(Section section, SectionOfTable(name, codec_table));
+    container.sections.push_back(std::move(section));
   }
   return absl::OkStatus();
 }
@@ -191,16 +245,11 @@ absl::StatusOr<BtfelTable> ReadSharedTables(const Container& container) {
     }
     for (const nlohmann::json& name : *names) {
       const Section* section = name.is_string() ? container.Find(name.get<std::string>()) : nullptr;
-      if (section == nullptr || section->dtype != DType::kF32) {
-        return absl::InvalidArgumentError(absl::StrCat("codec table ", name.dump(-1, ' ', true),
-                                                       ": there is no such section of dtype f32"));
-      }
-      CodecTable codec_table{section->shape, SectionValues<float>(*section)};
-      if (!AllFinite(codec_table.values)) {
+      if (section == nullptr) {
         return absl::InvalidArgumentError(
-            absl::StrCat("section '", section->name, "': a value is not finite"));
+            absl::StrCat("codec table ", name.dump(-1, ' ', true), ": there is no such section"));
       }
-      table.tables[section->name] = std::move(codec_table);
+      TESSERA_ASSIGN_OR_RETURN(table.tables[section->name], TableOfSection(*section));
     }
   }
   // Refuses an unknown codec by name, and tables that do not fit it.

@@ -1,14 +1,58 @@
 #include "btf/codec/decoder.h"
 
+#include <algorithm>
+#include <array>
 #include <cassert>
+#include <string_view>
 #include <utility>
 
 #include <absl/strings/str_cat.h>
+#include <absl/strings/str_join.h>
 
 #include "btf/base/status_macros.h"
 #include "btf/codec/dsh/dsh_decoder.h"
 
 namespace tessera {
+namespace {
+
+template <typename CodecDecoder>
+absl::StatusOr<std::unique_ptr<Decoder>> Make(const BtfelTable& table) {
+  TESSERA_ASSIGN_OR_RETURN(std::unique_ptr<CodecDecoder> decoder, CodecDecoder::Create(table));
+  return std::unique_ptr<Decoder>(std::move(decoder));
+}
+
+struct KnownCodec {
+  std::string_view id;
+  int version;
+  absl::StatusOr<std::unique_ptr<Decoder>> (*make)(const BtfelTable& table);
+};
+
+constexpr std::array kKnownCodecs = {
+    KnownCodec{"dsh-cls", 1, &Make<DshDecoder>},
+};
+
+// Sum of w[i] * codes[i]; lanes of their own, so that it vectorises without reordering a sum.
+float Dot(const float* w, const uint8_t* codes, int count) {
+  constexpr int kLanes = 32;
+  std::array<float, kLanes> sums{};
+  int i = 0;
+  for (; i + kLanes <= count; i += kLanes) {
+    for (int lane = 0; lane < kLanes; ++lane) {
+      sums[lane] += w[i + lane] * static_cast<float>(codes[i + lane]);
+    }
+  }
+  for (int lane = 0; i < count; ++i, ++lane) {
+    sums[lane] += w[i] * static_cast<float>(codes[i]);
+  }
+  for (int half = kLanes / 2; half > 0; half /= 2) {
+    for (int lane = 0; lane < half; ++lane) {
+      sums[lane] += sums[lane + half];
+    }
+  }
+  return sums[0];
+}
+
+}  // namespace
 
 void Decoder::Dequantize(std::span<const uint8_t> codes, std::span<double> values) const {
   assert(codes.size() == offset_.size() && values.size() == offset_.size());
@@ -17,25 +61,79 @@ void Decoder::Dequantize(std::span<const uint8_t> codes, std::span<double> value
   }
 }
 
+Eigen::Array3d Decoder::Evaluate(std::span<const double> coefficients, const Eigen::Vector3d& light,
+                                 const Eigen::Vector3d& view) const {
+  assert(std::cmp_equal(coefficients.size(), num_coefficients()));
+  const LinearForm form = Form(light, view);
+  Eigen::Array3d rgb = Eigen::Array3d::Zero();
+  const double* weight = form.weights.data();
+  for (const LinearForm::Run& run : form.runs) {
+    for (int i = run.first; i < run.first + run.count; ++i) {
+      rgb[run.channel] += *weight++ * coefficients[i];
+    }
+  }
+  return rgb;
+}
+
 Eigen::Array3d Decoder::Decode(std::span<const uint8_t> codes, const Eigen::Vector3d& light,
                                const Eigen::Vector3d& view, int turns) const {
-  std::vector<double> values(offset_.size());
-  Dequantize(codes, values);
-  return Evaluate(values, UnturnedFromTurned(light, turns), UnturnedFromTurned(view, turns)).max(0.0);
+  assert(std::cmp_equal(codes.size(), num_coefficients()));
+  const LinearForm form = Form(UnturnedFromTurned(light, turns), UnturnedFromTurned(view, turns));
+  Eigen::Array3d rgb = Eigen::Array3d::Zero();
+  const double* weight = form.weights.data();
+  for (const LinearForm::Run& run : form.runs) {
+    for (int i = run.first; i < run.first + run.count; ++i) {
+      rgb[run.channel] +=
+          *weight++ * (static_cast<double>(offset_[i]) + static_cast<double>(step_[i]) * codes[i]);
+    }
+  }
+  return rgb.max(0.0);
+}
+
+void Decoder::DecodeTexels(std::span<const uint8_t> codes, const Eigen::Vector3d& light,
+                           const Eigen::Vector3d& view, int turns, std::span<float> rgb) const {
+  const size_t k = offset_.size();
+  assert(codes.size() % k == 0 && rgb.size() == codes.size() / k * 3);
+  const LinearForm form = Form(UnturnedFromTurned(light, turns), UnturnedFromTurned(view, turns));
+  // On codes: weight * (offset + step * code) = constant + (weight * step) * code.
+  std::vector<float> weights(form.weights.size());
+  Eigen::Array3d constant = Eigen::Array3d::Zero();
+  size_t w = 0;
+  for (const LinearForm::Run& run : form.runs) {
+    for (int i = run.first; i < run.first + run.count; ++i, ++w) {
+      constant[run.channel] += form.weights[w] * offset_[i];
+      weights[w] = static_cast<float>(form.weights[w] * step_[i]);
+    }
+  }
+  const std::array<float, 3> start = {static_cast<float>(constant[0]), static_cast<float>(constant[1]),
+                                      static_cast<float>(constant[2])};
+  for (size_t texel = 0; texel * k < codes.size(); ++texel) {
+    std::array<float, 3> sum = start;
+    const float* weight = weights.data();
+    for (const LinearForm::Run& run : form.runs) {
+      sum[run.channel] += Dot(weight, codes.data() + texel * k + run.first, run.count);
+      weight += run.count;
+    }
+    for (int channel = 0; channel < 3; ++channel) {
+      rgb[3 * texel + channel] = std::max(sum[channel], 0.0F);
+    }
+  }
 }
 
 absl::StatusOr<std::unique_ptr<Decoder>> MakeDecoder(const BtfelTable& table) {
-  constexpr int kDshVersion = 1;
-  if (table.codec_id != "dsh-cls") {
-    return absl::UnimplementedError(
-        absl::StrCat("codec '", table.codec_id, "' is not known here; known: dsh-cls"));
+  const auto* const known =
+      std::ranges::find(kKnownCodecs, std::string_view(table.codec_id), &KnownCodec::id);
+  if (known == kKnownCodecs.end()) {
+    return absl::UnimplementedError(absl::StrCat(
+        "codec '", table.codec_id, "' is not known here; known: ",
+        absl::StrJoin(kKnownCodecs, ", ",
+                      [](std::string* out, const KnownCodec& codec) { out->append(codec.id); })));
   }
-  if (table.codec_version != kDshVersion) {
-    return absl::UnimplementedError(
-        absl::StrCat("codec 'dsh-cls' version ", table.codec_version, ", this library reads ", kDshVersion));
+  if (table.codec_version != known->version) {
+    return absl::UnimplementedError(absl::StrCat("codec '", table.codec_id, "' version ", table.codec_version,
+                                                 ", this library reads ", known->version));
   }
-  TESSERA_ASSIGN_OR_RETURN(std::unique_ptr<DshDecoder> decoder, DshDecoder::Create(table));
-  return std::unique_ptr<Decoder>(std::move(decoder));
+  return known->make(table);
 }
 
 }  // namespace tessera

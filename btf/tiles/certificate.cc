@@ -253,38 +253,10 @@ absl::StatusOr<nlohmann::json> CertifyTiles(const Material& material, const Exem
   }
 
   CertificateBuilder builder(exemplar, arrangement, maps);
-  const int num_coefficients = material.btfels.num_coefficients;
+  const size_t k = material.btfels.num_coefficients;
   const int num_lights = static_cast<int>(kCertificateLights.size());
-  const int num_columns = 3 * num_lights * static_cast<int>(turns.size());
   for (const auto& view_deg : kCertificateViews) {
     const Direction view{RadFromDeg(view_deg[0]), RadFromDeg(view_deg[1])};
-    // Decoding is linear in the coefficients up to the clamp at 0: one column of weights for each light, turn
-    // and channel, applied to codes.
-    Eigen::MatrixXf weights(num_coefficients, num_columns);
-    Eigen::RowVectorXf constant(num_columns);
-    ParallelFor(context, 0, num_columns / 3, 1, [&](int64_t column, int64_t) {
-      const auto& light_deg = kCertificateLights[column / static_cast<int64_t>(turns.size())];
-      const int turn = turns[column % static_cast<int64_t>(turns.size())];
-      const Direction light{RadFromDeg(light_deg[0]), RadFromDeg(light_deg[1])};
-      const Eigen::Vector3d light_vector = UnturnedFromTurned(VectorFromDirection(light), turn);
-      const Eigen::Vector3d view_vector = UnturnedFromTurned(VectorFromDirection(view), turn);
-      std::vector<double> coefficients(num_coefficients, 0.0);
-      Eigen::Array3d sum = Eigen::Array3d::Zero();
-      for (int k = 0; k < num_coefficients; ++k) {
-        coefficients[k] = 1.0;
-        const Eigen::Array3d rgb = decoder->Evaluate(coefficients, light_vector, view_vector);
-        coefficients[k] = 0.0;
-        sum += material.btfels.offset[k] * rgb;
-        for (int channel = 0; channel < 3; ++channel) {
-          weights(k, 3 * column + channel) = static_cast<float>(material.btfels.step[k] * rgb[channel]);
-        }
-      }
-      for (int channel = 0; channel < 3; ++channel) {
-        constant[3 * column + channel] = static_cast<float>(sum[channel]);
-      }
-    });
-    TESSERA_RETURN_IF_ERROR(context.CheckStop());
-
     std::vector<ExemplarImage> images(num_lights);
     for (int light = 0; light < num_lights; ++light) {
       images[light].view = view;
@@ -295,16 +267,12 @@ absl::StatusOr<nlohmann::json> CertifyTiles(const Material& material, const Exem
       }
     }
     ParallelFor(context, 0, exemplar.num_pixels(), kTexelsPerBlock, [&](int64_t begin, int64_t end) {
-      const Eigen::Map<const Eigen::Matrix<uint8_t, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>> codes(
-          material.btfels.codes.data() + begin * num_coefficients, end - begin, num_coefficients);
-      const Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> values =
-          ((codes.cast<float>() * weights).rowwise() + constant).cwiseMax(0.0f);
-      for (int64_t texel = begin; texel < end; ++texel) {
-        for (int column = 0; column < num_columns / 3; ++column) {
-          std::vector<float>& rgb = images[column / turns.size()].rgb[turns[column % turns.size()]];
-          for (int channel = 0; channel < 3; ++channel) {
-            rgb[3 * texel + channel] = values(texel - begin, 3 * column + channel);
-          }
+      const auto count = static_cast<size_t>(end - begin);
+      const std::span<const uint8_t> codes = std::span(material.btfels.codes).subspan(begin * k, count * k);
+      for (ExemplarImage& image : images) {
+        for (const int turn : turns) {
+          decoder->DecodeTexels(codes, VectorFromDirection(image.light), VectorFromDirection(view), turn,
+                                std::span(image.rgb[turn]).subspan(3 * begin, 3 * count));
         }
       }
     });

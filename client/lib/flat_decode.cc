@@ -1,6 +1,7 @@
 #include "client/lib/flat_decode.h"
 
 #include <memory>
+#include <span>
 
 #include <absl/strings/str_cat.h>
 
@@ -21,15 +22,12 @@ absl::StatusOr<Image> DecodeFlat(const Material& material, const Direction& ligh
   const Eigen::Vector3d wi = VectorFromDirection(light);
   const Eigen::Vector3d wo = VectorFromDirection(view);
   Image picture(material.width, material.height, 3);
+  const size_t row_codes = static_cast<size_t>(material.width) * material.btfels.num_coefficients;
+  const size_t row_values = static_cast<size_t>(material.width) * 3;
   for (int y = 0; y < material.height; ++y) {
     TESSERA_RETURN_IF_ERROR(context.CheckStop());
-    for (int x = 0; x < material.width; ++x) {
-      const size_t texel = static_cast<size_t>(y) * material.width + x;
-      const Eigen::Array3d rgb = decoder->Decode(material.btfels.btfel(texel), wi, wo, /*turns=*/0);
-      for (int channel = 0; channel < 3; ++channel) {
-        picture.at(x, y)[channel] = static_cast<float>(rgb[channel]);
-      }
-    }
+    decoder->DecodeTexels(std::span(material.btfels.codes).subspan(y * row_codes, row_codes), wi, wo,
+                          /*turns=*/0, std::span(picture.pixels).subspan(y * row_values, row_values));
     context.Report("decoding", static_cast<uint64_t>(y) + 1, static_cast<uint64_t>(material.height), "rows");
   }
   return picture;

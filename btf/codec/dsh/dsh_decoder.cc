@@ -130,28 +130,25 @@ void DshDecoder::ViewWeights(const Eigen::Vector3d& view, std::span<double> weig
   Weights(view, view_limit_, basis_view_, is_view_plain_, weights);
 }
 
-Eigen::Array3d DshDecoder::Evaluate(std::span<const double> coefficients, const Eigen::Vector3d& light,
-                                    const Eigen::Vector3d& view) const {
-  assert(std::cmp_equal(coefficients.size(), num_coefficients()));
+LinearForm DshDecoder::Form(const Eigen::Vector3d& light, const Eigen::Vector3d& view) const {
+  LinearForm form;
   if (light.z() <= 0.0 || view.z() <= 0.0) {
-    return Eigen::Array3d::Zero();
+    return form;
   }
   std::array<double, kMaxShFunctions> light_weights{};
   std::array<double, kMaxShFunctions> view_weights{};
   LightWeights(light, std::span(light_weights).first(kl()));
   ViewWeights(view, std::span(view_weights).first(kv()));
-  Eigen::Array3d rgb = Eigen::Array3d::Zero();
-  const double* c = coefficients.data();
+  form.weights.reserve(num_coefficients());
   for (int channel = 0; channel < 3; ++channel) {
+    form.runs.push_back({channel, channel * kl() * kv(), kl() * kv()});
     for (int j = 0; j < kv(); ++j) {
-      double sum = 0.0;
       for (int i = 0; i < kl(); ++i) {
-        sum += light_weights[i] * *c++;
+        form.weights.push_back(view_weights[j] * light_weights[i]);
       }
-      rgb[channel] += view_weights[j] * sum;
     }
   }
-  return rgb;
+  return form;
 }
 
 }  // namespace tessera

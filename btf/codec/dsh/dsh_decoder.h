@@ -43,8 +43,7 @@ class DshDecoder final : public Decoder {
   void LightWeights(const Eigen::Vector3d& light, std::span<double> weights) const;
   void ViewWeights(const Eigen::Vector3d& view, std::span<double> weights) const;
 
-  [[nodiscard]] Eigen::Array3d Evaluate(std::span<const double> coefficients, const Eigen::Vector3d& light,
-                                        const Eigen::Vector3d& view) const override;
+  [[nodiscard]] LinearForm Form(const Eigen::Vector3d& light, const Eigen::Vector3d& view) const override;
 
  private:
   struct PolarLimit {

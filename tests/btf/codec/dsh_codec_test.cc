@@ -318,6 +318,24 @@ TEST(DshDecoderTest, IsTheDoubleSum) {
   }
 }
 
+TEST(DecoderTest, ManyTexelsAreEachTexel) {
+  const BtfelTable table = RandomTable(25, 9);
+  const auto decoder = MakeDecoder(table);
+  ASSERT_TRUE(decoder.ok());
+  const Eigen::Vector3d light = VectorFromDirection({1.4, 4.0});
+  const Eigen::Vector3d view = VectorFromDirection({0.3, 1.0});
+  for (int turns = 0; turns < 4; ++turns) {
+    std::vector<float> rgb(table.size() * 3, -1.0F);
+    (*decoder)->DecodeTexels(table.codes, light, view, turns, rgb);
+    for (size_t texel = 0; texel < table.size(); ++texel) {
+      const Eigen::Array3d one = (*decoder)->Decode(table.btfel(texel), light, view, turns);
+      for (int channel = 0; channel < 3; ++channel) {
+        EXPECT_NEAR(rgb[3 * texel + channel], one[channel], 2e-6) << texel << ' ' << channel;
+      }
+    }
+  }
+}
+
 TEST(DshDecoderTest, NeverExtrapolates) {
   const BtfelTable table = RandomTable(25, 25);
   const auto decoder = DshDecoder::Create(table);

@@ -239,6 +239,27 @@ TEST(MaterialTest, IsNotWrittenWhenMisshapen) {
   EXPECT_THAT(std::string(SerializeMaterial(material).status().message()), HasSubstr("views"));
 }
 
+TEST(BtfelTableIoTest, TablesKeepTheirDtype) {
+  BtfelTable table = Golden().btfels;
+  table.tables["bytes"] = {{3}, {0.0F, 7.0F, 255.0F}, DType::kU8};
+  table.tables["words"] = {{2, 1}, {256.0F, 65535.0F}, DType::kU16};
+  Container container{.kind = "material"};
+  ASSERT_TRUE(AddSharedTables(table, container).ok());
+  EXPECT_EQ(container.Find("bytes")->dtype, DType::kU8);
+  EXPECT_EQ(container.Find("words")->bytes.size(), 4U);
+  const auto read = ReadSharedTables(container);
+  ASSERT_TRUE(read.ok()) << read.status();
+  for (const auto& [name, written] : table.tables) {
+    EXPECT_EQ(read->tables.at(name).values, written.values) << name;
+    EXPECT_EQ(read->tables.at(name).dtype, written.dtype) << name;
+  }
+  for (const float bad : {-1.0F, 0.5F, 256.0F, std::numeric_limits<float>::quiet_NaN()}) {
+    table.tables["bytes"].values[0] = bad;
+    Container refused{.kind = "material"};
+    EXPECT_THAT(std::string(AddSharedTables(table, refused).message()), HasSubstr("'bytes'")) << bad;
+  }
+}
+
 TEST(BtfelTableIoTest, CoefficientsByEnergyComeBackInOrder) {
   const BtfelTable table = Golden().btfels;
   Container container{.kind = "tile_set"};
