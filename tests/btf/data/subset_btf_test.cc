@@ -1,0 +1,93 @@
+#include "btf/data/subset_btf.h"
+
+#include <algorithm>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "btf/data/half_btf.h"
+#include "tests/support/btf_files.h"
+#include "tests/support/read_btf.h"
+
+namespace tessera {
+namespace {
+
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+
+std::unique_ptr<MemoryBtf> SmallBtf() {
+  return AsymmetricBtf(5, 4, WholeDegreeDirections(2, 3), WholeDegreeDirections(3, 4));
+}
+
+TEST(SubsetBtfTest, EveryFifthDirectionIsHeldOut) {
+  EXPECT_THAT(HeldOutDirections(15), ElementsAre(4, 9, 14));
+  EXPECT_THAT(HeldOutDirections(4), ElementsAre());
+  EXPECT_THAT(KeptDirections(7), ElementsAre(0, 1, 2, 3, 5, 6));
+  EXPECT_EQ(HeldOutDirections(81).size() + KeptDirections(81).size(), 81u);
+}
+
+TEST(SubsetBtfTest, HoldsTheSourcesSamples) {
+  const auto btf = SmallBtf();
+  const BtfSubset kept{.views = {1, 4}, .lights = {0, 3, 7, 8}, .columns = {0, 3}, .rows = {1, 2, 3}};
+  const auto subset = SubsetBtf::Create(*btf, kept);
+  ASSERT_TRUE(subset.ok()) << subset.status();
+  ASSERT_EQ((*subset)->info().width, 2);
+  ASSERT_EQ((*subset)->info().height, 3);
+  ASSERT_EQ((*subset)->info().views.size(), 2u);
+  EXPECT_EQ((*subset)->info().views[1].phi_rad, btf->info().views[4].phi_rad);
+  EXPECT_EQ((*subset)->info().lights[2].theta_rad, btf->info().lights[7].theta_rad);
+  for (const int rows_at_a_time : {1, 2, 3}) {
+    const std::vector<float> samples = AllSamples(**subset, rows_at_a_time);
+    size_t index = 0;
+    for (const int y : kept.rows) {
+      for (const int x : kept.columns) {
+        for (int channel = 0; channel < 3; ++channel) {
+          for (const int view : kept.views) {
+            for (const int light : kept.lights) {
+              ASSERT_EQ(samples[index++], btf->at(x, y, channel, view, light));
+            }
+          }
+        }
+      }
+    }
+    ASSERT_EQ(index, samples.size());
+  }
+}
+
+TEST(SubsetBtfTest, EmptyKeepsAll) {
+  const auto btf = SmallBtf();
+  const auto subset = SubsetBtf::Create(*btf, {});
+  ASSERT_TRUE(subset.ok());
+  EXPECT_EQ(AllSamples(**subset), AllSamples(*btf));
+}
+
+TEST(SubsetBtfTest, NamesTheIndexThatIsWrong) {
+  const auto btf = SmallBtf();
+  EXPECT_THAT(std::string(SubsetBtf::Create(*btf, {.views = {0, 99}}).status().message()),
+              HasSubstr("view 99"));
+  EXPECT_THAT(std::string(SubsetBtf::Create(*btf, {.lights = {3, 3}}).status().message()),
+              HasSubstr("light 3 after 3"));
+  EXPECT_THAT(std::string(SubsetBtf::Create(*btf, {.rows = {-1}}).status().message()), HasSubstr("row -1"));
+}
+
+TEST(HalfBtfTest, RoundsToElevenBits) {
+  const auto btf = SmallBtf();
+  const auto half = HalfBtf::CopyOf(*btf, 1 << 20, {});
+  ASSERT_TRUE(half.ok()) << half.status();
+  const std::vector<float> expected = AllSamples(*btf);
+  const std::vector<float> samples = AllSamples(**half, 3);
+  constexpr float kHalfUlp = 0x1p-11F;
+  constexpr float kLeastNormal = 0x1p-14F;  // below it, steps are absolute
+  for (size_t i = 0; i < expected.size(); ++i) {
+    ASSERT_LE(std::abs(samples[i] - expected[i]), kHalfUlp * std::max(kLeastNormal, expected[i]));
+  }
+}
+
+TEST(HalfBtfTest, RefusesWhatExceedsTheLimit) {
+  const auto btf = SmallBtf();
+  const auto half = HalfBtf::CopyOf(*btf, HalfBtf::SizeBytes(*btf) - 1, {});
+  EXPECT_EQ(half.status().code(), absl::StatusCode::kResourceExhausted);
+}
+
+}  // namespace
+}  // namespace tessera
