@@ -16,10 +16,8 @@
 namespace tessera {
 
 // As Codec::Embed for tables that DshDecoder decodes; dims beyond the number of coefficients k are not given,
-// so result.dims = min(dims, k). Deterministic for any number of threads; the sign of a component makes the
-// largest of its coefficients positive. Cost: one k x k covariance over all texels in float (3 k^2 floats and
-// doubles of memory), then subspace iteration on it in double. Errors: INVALID_ARGUMENT (dims < 1, a
-// misshapen material), CANCELLED.
+// so result.dims = min(dims, k). Determinism, memory and cost are those of EmbedFeatures (feature_pca.h) with
+// F = k. Errors: INVALID_ARGUMENT (dims < 1, a misshapen material), CANCELLED.
 [[nodiscard]] absl::StatusOr<Embedding> EmbedDsh(const Material& material, int dims,
                                                  const RunContext& context);
 
