@@ -10,6 +10,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "btf/codec/code_buffer.h"
 #include "btf/codec/container.h"
 #include "btf/data/btf_source.h"
 #include "btf/math/conventions.h"
@@ -35,7 +36,7 @@ struct BtfelTable {
   nlohmann::json parameters = nlohmann::json::object();  // what the codec recorded: kl, kv, ...
   std::vector<Direction> views;
   std::vector<Direction> lights;
-  std::vector<uint8_t> codes;  // [n][k]
+  CodeBuffer codes;  // [n][k]
 
   [[nodiscard]] size_t size() const { return num_coefficients == 0 ? 0 : codes.size() / num_coefficients; }
   [[nodiscard]] std::span<const uint8_t> btfel(size_t index) const {

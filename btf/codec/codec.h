@@ -6,6 +6,7 @@
 #pragma once
 
 #include <cstdint>
+#include <filesystem>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -13,6 +14,7 @@
 #include <absl/status/statusor.h>
 
 #include "btf/base/run_context.h"
+#include "btf/codec/code_buffer.h"
 #include "btf/codec/material.h"
 #include "btf/data/btf_source.h"
 
@@ -27,7 +29,14 @@ struct EncodeParams {
   int kv = 25;  // view coefficients, likewise
   ClsEnergy cls_energy = ClsEnergy::kHemisphere;
   uint64_t memory_budget_bytes = uint64_t{512} << 20;
+  std::filesystem::path spill_folder;  // for what exceeds the budget; empty: the system's temporary folder
 };
+
+// Room for the codes of a result: in memory up to a quarter of the budget, in a spill file beyond it. Fill it
+// block by block, each followed by DropPages(). Errors: RESOURCE_EXHAUSTED naming the bytes needed and free.
+[[nodiscard]] inline absl::StatusOr<CodeBuffer> CreateCodes(uint64_t num_codes, const EncodeParams& params) {
+  return CodeBuffer::Create(num_codes, params.memory_budget_bytes / 4, params.spill_folder);
+}
 
 // Texels as points in R^dims in which squared Euclidean distance approximates the hemisphere-integrated
 // squared difference of two BTFels (mean over channels), each as seen after `turn` quarter turns. Components
@@ -64,8 +73,10 @@ class Codec {
   [[nodiscard]] virtual std::string_view id() const = 0;
   [[nodiscard]] virtual int version() const = 0;
 
-  // Encodes every texel; streams rows within params.memory_budget_bytes. Errors: INVALID_ARGUMENT naming the
-  // parameter and its legal values, or the sample that is not finite; CANCELLED; whatever the source returns.
+  // Encodes every texel; streams rows within params.memory_budget_bytes. The result is part of it
+  // (CreateCodes). Errors: INVALID_ARGUMENT naming the parameter and its
+  // legal values, or the sample that is not finite; RESOURCE_EXHAUSTED when the spill folder is full;
+  // CANCELLED; whatever the source returns.
   [[nodiscard]] virtual absl::StatusOr<Material> Encode(BtfSource& source, const EncodeParams& params,
                                                         const RunContext& context) const = 0;
 

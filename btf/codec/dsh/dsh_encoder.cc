@@ -376,7 +376,7 @@ absl::StatusOr<Material> EncodeDshCls(BtfSource& source, const EncodeParams& par
   table.views = info.views;
   table.lights = info.lights;
   Quantisation quantisation = UniformQuantisation(ranges.minima, ranges.maxima);
-  table.codes.resize(values_per_row * info.height);
+  TESSERA_ASSIGN_OR_RETURN(table.codes, CreateCodes(values_per_row * info.height, params));
   for (int row = 0; row < info.height; row += rows_per_block) {
     TESSERA_RETURN_IF_ERROR(context.CheckStop());
     const size_t begin = values_per_row * row;
@@ -389,6 +389,7 @@ absl::StatusOr<Material> EncodeDshCls(BtfSource& source, const EncodeParams& par
                   Quantize(quantisation, values.subspan(first * k, size),
                            std::span(table.codes).subspan(begin + first * k, size));
                 });
+    table.codes.DropPages();
   }
   TESSERA_RETURN_IF_ERROR(context.CheckStop());
   table.offset = std::move(quantisation.offset);
