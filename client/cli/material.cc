@@ -7,6 +7,7 @@
 
 #include "btf/base/status_macros.h"
 #include "btf/codec/codec.h"
+#include "btf/codec/diagnosis.h"
 #include "btf/data/import.h"
 #include "btf/image/image_io.h"
 #include "client/cli/arguments.h"
@@ -80,7 +81,8 @@ absl::Status CheckNameIsFree(Client& client, const std::string& name, bool repla
 // The answer of every command that made a material.
 void AnswerMade(Session& session, const v1::Material& material, std::string_view job_name) {
   const std::vector<StageTime> stages = session.FinishStages();
-  Json value = {{"material", Describe(material)}, {"stages", Session::JsonOfStages(stages)}};
+  const Json described = Describe(material);
+  Json value = {{"material", described}, {"stages", Session::JsonOfStages(stages)}};
   if (!job_name.empty()) {
     value["job"] = ShortName(job_name);
   }
@@ -100,6 +102,11 @@ void AnswerMade(Session& session, const v1::Material& material, std::string_view
   text += fmt::format("\n{:<12} {:8.2f} s, at most {} of memory here", "in all", total,
                       FormatAmount(static_cast<double>(usage.ru_maxrss * kBytesPerUnit), "bytes"));
   session.Answer(value, text);
+  const Json::json_pointer place("/metadata/diagnosis/warnings");
+  for (const Json& warning : described.value(place, Json::array())) {
+    session.Warn(fmt::format("{}: {}", ShortName(material.name()),
+                             warning.is_string() ? warning.get<std::string>() : warning.dump()));
+  }
 }
 
 // Waits for a job that makes a material and answers with it; Ctrl-C cancels the job.
@@ -137,7 +144,8 @@ absl::Status ImportHere(Session& session, Client& client, const ImportFlags& fla
   {
     TESSERA_ASSIGN_OR_RETURN(const std::unique_ptr<BtfSource> source,
                              ImportBtf(flags.path, options, context));
-    TESSERA_ASSIGN_OR_RETURN(const Material material, codec->Encode(*source, params, context));
+    TESSERA_ASSIGN_OR_RETURN(Material material, codec->Encode(*source, params, context));
+    TESSERA_RETURN_IF_ERROR(RecordDiagnosis(*source, context, material));
     TESSERA_ASSIGN_OR_RETURN(bytes, SerializeMaterial(material));
   }
   TESSERA_ASSIGN_OR_RETURN(const v1::Blob blob, client.UploadBytes(std::as_bytes(std::span(bytes)), context));

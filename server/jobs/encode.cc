@@ -4,6 +4,7 @@
 
 #include "btf/base/status_macros.h"
 #include "btf/codec/codec.h"
+#include "btf/codec/diagnosis.h"
 #include "proto/wire/convert.h"
 #include "proto/wire/status.h"
 
@@ -39,7 +40,9 @@ absl::StatusOr<Material> EncodeSource(BtfSource& source, const v1::EncodeOptions
   FillDefaults(filled);
   TESSERA_ASSIGN_OR_RETURN(const Codec* codec, CodecOf(filled));
   TESSERA_ASSIGN_OR_RETURN(const EncodeParams params, EncodeParamsFromMessage(filled));
-  return codec->Encode(source, params, context);
+  TESSERA_ASSIGN_OR_RETURN(Material material, codec->Encode(source, params, context));
+  TESSERA_RETURN_IF_ERROR(RecordDiagnosis(source, context, material));
+  return material;
 }
 
 absl::StatusOr<JobOutput> OutputOfMaterial(const Material& material) {
