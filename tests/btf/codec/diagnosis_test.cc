@@ -24,7 +24,7 @@ Diagnosis DiagnosisOf(SampledBtf& btf, const EncodeParams& params) {
   return *diagnosis;
 }
 
-constexpr EncodeParams kFew = {.kl = 9, .kv = 9, .cls_energy = ClsEnergy::kSphere};
+const EncodeParams kFew = {.kl = 9, .kv = 9, .cls_energy = ClsEnergy::kSphere};
 
 TEST(DiagnosisTest, IsSilentOnASoundMaterial) {
   SampledBtf btf = ShinyBtf(6, 6, RingDirections(5, 12), RingDirections(5, 12));
