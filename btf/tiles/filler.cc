@@ -4,6 +4,7 @@
 #include <array>
 #include <limits>
 #include <optional>
+#include <utility>
 
 #include "btf/base/rng.h"
 #include "btf/base/status_macros.h"
@@ -40,6 +41,8 @@ constexpr int kPatchesPerFeature = 5;
 constexpr int kFewestPatches = 24;
 constexpr int kPatience = 4;           // times as many while a threshold is missed
 constexpr int kFruitlessPatches = 24;  // improvements in a row that fail before a good canvas is left alone
+
+enum SeedStage : uint64_t { kLaySeed = 1, kImproveSeed = 2 };
 
 int LargestWindow(const Exemplar& exemplar, int feature_size) {
   const int shorter = std::min(exemplar.width(), exemplar.height());
@@ -128,8 +131,8 @@ void MakeQuery(const Canvas& canvas, const Window& window, SearchQuery& query) {
   }
 }
 
-// Searches patches for the window, cuts some of the best and keeps the cheapest. Returns how many texels it
-// changed.
+// Searches patches for the window, cuts some of the best and keeps the cheapest, one that repeats a sibling
+// only when the window must be filled and all of them do. Returns how many texels it changed.
 int MatchWindow(const FillParams& params, const Window& window, const Matching& matching,
                 const std::stop_token& stop, Rng& rng, FillerScratch& scratch, Canvas& canvas,
                 FillReport& report) {
@@ -140,13 +143,22 @@ int MatchWindow(const FillParams& params, const Window& window, const Matching& 
   candidates = SampleCandidates(std::move(candidates), matching.trials, matching.temperature, rng);
   std::optional<Patch> best_patch;
   PatchCut best_cut;
+  bool best_repeats = false;
   for (const Candidate& candidate : candidates) {
     const PatchCut& cut = scratch.cutter.Cut(canvas, window, candidate.patch);
     ++report.num_patches;
-    if (cut.num_new > 0 && (!matching.must_improve || cut.cost_change < 0) &&
-        (!best_patch || cut.cost_change < best_cut.cost_change)) {
+    if (cut.num_new == 0 || (matching.must_improve && cut.cost_change >= 0)) {
+      continue;
+    }
+    const bool repeats = params.siblings != nullptr &&
+                         params.siblings->Repeats(canvas.exemplar(), window, candidate.patch, cut);
+    if (repeats && matching.must_improve) {
+      continue;
+    }
+    if (!best_patch || std::pair(repeats, cut.cost_change) < std::pair(best_repeats, best_cut.cost_change)) {
       best_patch = candidate.patch;
       best_cut = cut;
+      best_repeats = repeats;
     }
   }
   if (!best_patch) {
@@ -182,9 +194,9 @@ void Filler::Lay(const Window& window, const Patch& patch, Canvas& canvas, FillR
   PatchCutter::Apply(window, patch, cut, canvas);
 }
 
-absl::Status Filler::Fill(const FillParams& params, const RunContext& context, Canvas& canvas,
-                          FillReport& report) {
-  Rng rng(params.seed);
+absl::Status Filler::LayEmpty(const FillParams& params, const RunContext& context, Canvas& canvas,
+                              FillReport& report) {
+  Rng rng(Mix64(params.seed, kLaySeed));
   const int largest = LargestWindow(canvas.exemplar(), params.feature_size);
   while (canvas.num_unfilled() > 0) {
     const int first = std::min(largest, kFirstFeatures * params.feature_size / 2);
@@ -195,7 +207,13 @@ absl::Status Filler::Fill(const FillParams& params, const RunContext& context, C
       return absl::InternalError("no patch covers the empty part of a canvas");
     }
   }
+  return absl::OkStatus();
+}
 
+absl::Status Filler::Improve(const FillParams& params, const RunContext& context, Canvas& canvas,
+                             FillReport& report) {
+  Rng rng(Mix64(params.seed, kImproveSeed));
+  const int largest = LargestWindow(canvas.exemplar(), params.feature_size);
   int num_free = 0;
   for (int y = 0; y < canvas.height(); ++y) {
     for (int x = 0; x < canvas.width(); ++x) {
@@ -229,6 +247,12 @@ absl::Status Filler::Fill(const FillParams& params, const RunContext& context, C
   report.largest_mismatch = measured.largest_mismatch;
   report.reached = measured.reached;
   return absl::OkStatus();
+}
+
+absl::Status Filler::Fill(const FillParams& params, const RunContext& context, Canvas& canvas,
+                          FillReport& report) {
+  TESSERA_RETURN_IF_ERROR(LayEmpty(params, context, canvas, report));
+  return Improve(params, context, canvas, report);
 }
 
 }  // namespace tessera

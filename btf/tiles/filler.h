@@ -15,6 +15,7 @@
 #include "btf/base/run_context.h"
 #include "btf/tiles/candidates.h"
 #include "btf/tiles/seam_graph.h"
+#include "btf/tiles/siblings.h"
 
 namespace tessera {
 
@@ -22,9 +23,10 @@ struct FillParams {
   std::vector<int> turns;  // that patches may have
   int feature_size = 16;   // h: windows are one to three of it
   uint64_t seed = 1;
-  double mean_threshold = 0.0;   // of FillReport.mean_mismatch
-  double texel_threshold = 0.0;  // of FillReport.largest_mismatch
-  const UsageMap* usage = nullptr;
+  double mean_threshold = 0.0;         // of FillReport.mean_mismatch
+  double texel_threshold = 0.0;        // of FillReport.largest_mismatch
+  const UsageMap* usage = nullptr;     // makes places used often dearer
+  const Siblings* siblings = nullptr;  // patches that repeat one are laid only where no other was found
 };
 
 struct FillReport {
@@ -53,8 +55,14 @@ class Filler {
   // Lays one patch given by the caller: its free texels in `window` are filled or improved.
   void Lay(const Window& window, const Patch& patch, Canvas& canvas, FillReport& report);
 
-  // Fills what is unfilled, then improves. The report tells whether the thresholds were reached; CANCELLED
-  // within one patch search after a stop request. Depends on nothing but its arguments.
+  // Lays first windows until nothing is unfilled. This and the two below depend on nothing but their
+  // arguments and return CANCELLED within one patch search after a stop request.
+  absl::Status LayEmpty(const FillParams& params, const RunContext& context, Canvas& canvas,
+                        FillReport& report);
+  // Matches bad seams again; nothing may be unfilled. The report tells whether the thresholds were reached.
+  absl::Status Improve(const FillParams& params, const RunContext& context, Canvas& canvas,
+                       FillReport& report);
+  // LayEmpty, then Improve.
   absl::Status Fill(const FillParams& params, const RunContext& context, Canvas& canvas, FillReport& report);
 
  private:

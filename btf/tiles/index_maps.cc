@@ -19,9 +19,6 @@ constexpr int kSmallestStrip = 8;
 constexpr int kSmallestExemplar = 32;
 // The BTFel number of a packed texel has 30 bits; tiles of 16,384 texels are far beyond any use.
 constexpr int kLargestTile = 16384;
-// Tiles are made in groups; after each, what its tiles used makes the same places dearer for the next. The
-// group is the same for any number of threads, so the result is too.
-constexpr int kTilesPerGroup = 8;
 
 enum SeedStage : uint64_t { kCornerSeed = 1, kStripSeed = 2, kTileSeed = 3 };
 
@@ -127,32 +124,53 @@ absl::StatusOr<IndexMaps> SynthesizeIndexMaps(const Exemplar& exemplar, const Ar
         CheckReached(maps.strips[strip].report, params, absl::StrFormat("strip %d", strip)));
   }
 
+  // So that tiles do not repeat each other, and do not depend on the number of threads: they are laid one
+  // after the other, each knowing those before it; then all are improved, which is nineteen parts in twenty
+  // of the work, each knowing the others as they were laid.
   UsageMap usage(exemplar.width(), exemplar.height());
-  done = 0;
-  statuses.assign(num_tiles, absl::OkStatus());
-  for (int group = 0; group < num_tiles; group += kTilesPerGroup) {
-    const int group_end = std::min(num_tiles, group + kTilesPerGroup);
-    ParallelFor(context, group, group_end, 1, [&](int64_t begin, int64_t) {
-      const int tile = static_cast<int>(begin);
-      const std::span<uint32_t> texels = std::span(maps.texels).subspan(tile * tile_area, tile_area);
-      const std::vector<uint32_t> frame =
-          BuildFrame(arrangement, SidesFromTileCode(arrangement.codes[tile]), corners, maps.strips);
-      std::copy(frame.begin(), frame.end(), texels.begin());
-      FillParams fill = fill_params(kTileSeed, tile);
-      fill.turns = TurnsOfInterior(arrangement);
-      fill.usage = &usage;
-      statuses[tile] = SynthesizeInterior(spectra, size, fill, context, texels, maps.tile_reports[tile]);
-      count_one("tiles", num_tiles);
-    });
-    TESSERA_RETURN_IF_ERROR(context.CheckStop());
-    for (int tile = group; tile < group_end; ++tile) {
-      TESSERA_RETURN_IF_ERROR(statuses[tile]);
-      TESSERA_RETURN_IF_ERROR(
-          CheckReached(maps.tile_reports[tile], params,
-                       absl::StrFormat("tile %d (code %d)", tile, arrangement.codes[tile])));
-      usage.Count(std::span(maps.texels).subspan(tile * tile_area, tile_area));
+  const auto texels_of = [&](int tile) {
+    return std::span(maps.texels).subspan(tile * tile_area, tile_area);
+  };
+  const int margin = params.strip_height / 2;
+  const auto tile_params = [&](int tile, const Siblings& siblings) {
+    FillParams fill = fill_params(kTileSeed, tile);
+    fill.turns = TurnsOfInterior(arrangement);
+    fill.usage = &usage;
+    fill.siblings = &siblings;
+    return fill;
+  };
+  Filler filler(spectra);
+  for (int tile = 0; tile < num_tiles; ++tile) {
+    const std::span<uint32_t> texels = texels_of(tile);
+    const std::vector<uint32_t> frame =
+        BuildFrame(arrangement, SidesFromTileCode(arrangement.codes[tile]), corners, maps.strips);
+    std::copy(frame.begin(), frame.end(), texels.begin());
+    const Siblings siblings(maps.texels, size, margin, tile);
+    TESSERA_RETURN_IF_ERROR(LayInterior(exemplar, size, tile_params(tile, siblings), context, filler, texels,
+                                        maps.tile_reports[tile]));
+    // Insides only: how often a strip is shown is the arrangement's affair.
+    for (int y = margin; y < size - margin; ++y) {
+      usage.Count(texels.subspan(static_cast<size_t>(y) * size + margin, size - 2 * margin));
     }
     usage.Finish();
+  }
+  const std::vector<uint32_t> laid = maps.texels;
+  done = 0;
+  statuses.assign(num_tiles, absl::OkStatus());
+  ParallelFor(context, 0, num_tiles, 1, [&](int64_t begin, int64_t) {
+    const int tile = static_cast<int>(begin);
+    const Siblings siblings(laid, size, margin, tile);
+    Filler filler(spectra);
+    statuses[tile] = ImproveInterior(exemplar, size, tile_params(tile, siblings), context, filler,
+                                     texels_of(tile), maps.tile_reports[tile]);
+    count_one("tiles", num_tiles);
+  });
+  TESSERA_RETURN_IF_ERROR(context.CheckStop());
+  for (int tile = 0; tile < num_tiles; ++tile) {
+    TESSERA_RETURN_IF_ERROR(statuses[tile]);
+    TESSERA_RETURN_IF_ERROR(
+        CheckReached(maps.tile_reports[tile], params,
+                     absl::StrFormat("tile %d (code %d)", tile, arrangement.codes[tile])));
   }
   return maps;
 }

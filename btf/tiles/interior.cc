@@ -6,9 +6,11 @@
 
 namespace tessera {
 
-absl::Status SynthesizeInterior(const ExemplarSpectra& spectra, int size, const FillParams& params,
-                                const RunContext& context, std::span<uint32_t> texels, FillReport& report) {
-  Canvas canvas(spectra.exemplar(), size, size);
+namespace {
+
+// The texels on a canvas whose border row stays.
+Canvas CanvasOfTile(const Exemplar& exemplar, int size, std::span<const uint32_t> texels) {
+  Canvas canvas(exemplar, size, size);
   for (int y = 0; y < size; ++y) {
     for (int x = 0; x < size; ++x) {
       if (const uint32_t texel = texels[static_cast<size_t>(y) * size + x]; texel != kNoTexel) {
@@ -19,8 +21,25 @@ absl::Status SynthesizeInterior(const ExemplarSpectra& spectra, int size, const 
       }
     }
   }
-  Filler filler(spectra);
-  TESSERA_RETURN_IF_ERROR(filler.Fill(params, context, canvas, report));
+  return canvas;
+}
+
+}  // namespace
+
+absl::Status LayInterior(const Exemplar& exemplar, int size, const FillParams& params,
+                         const RunContext& context, Filler& filler, std::span<uint32_t> texels,
+                         FillReport& report) {
+  Canvas canvas = CanvasOfTile(exemplar, size, texels);
+  TESSERA_RETURN_IF_ERROR(filler.LayEmpty(params, context, canvas, report));
+  std::copy(canvas.texels().begin(), canvas.texels().end(), texels.begin());
+  return absl::OkStatus();
+}
+
+absl::Status ImproveInterior(const Exemplar& exemplar, int size, const FillParams& params,
+                             const RunContext& context, Filler& filler, std::span<uint32_t> texels,
+                             FillReport& report) {
+  Canvas canvas = CanvasOfTile(exemplar, size, texels);
+  TESSERA_RETURN_IF_ERROR(filler.Improve(params, context, canvas, report));
   std::copy(canvas.texels().begin(), canvas.texels().end(), texels.begin());
   return absl::OkStatus();
 }

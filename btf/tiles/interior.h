@@ -11,9 +11,15 @@
 
 namespace tessera {
 
-// Fills and improves `texels`, [size][size] with kNoTexel where empty. Frame texels may be replaced, those of
-// the border row not: they must agree with the neighbouring tile. Errors: CANCELLED.
-absl::Status SynthesizeInterior(const ExemplarSpectra& spectra, int size, const FillParams& params,
-                                const RunContext& context, std::span<uint32_t> texels, FillReport& report);
+// Fills `texels`, [size][size] with kNoTexel where empty. Frame texels may be replaced,
+// those of the border row not: they must agree with the neighbouring tile. Errors: CANCELLED.
+absl::Status LayInterior(const Exemplar& exemplar, int size, const FillParams& params,
+                         const RunContext& context, Filler& filler, std::span<uint32_t> texels,
+                         FillReport& report);
+
+// Improves the seams of a laid tile, under the same rules. Errors: CANCELLED.
+absl::Status ImproveInterior(const Exemplar& exemplar, int size, const FillParams& params,
+                             const RunContext& context, Filler& filler, std::span<uint32_t> texels,
+                             FillReport& report);
 
 }  // namespace tessera

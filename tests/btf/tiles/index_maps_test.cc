@@ -155,6 +155,33 @@ TEST(IndexMapsTest, SameSeedGivesTheSameTilesForAnyNumberOfThreads) {
   EXPECT_NE(one.texels, Synthesize(exemplar, "surface-96", params, 2).texels);
 }
 
+// On a grid, an inside that two tiles have in common in the same place is seen to come back.
+TEST(IndexMapsTest, NoTwoTilesShowTheSameInside) {
+  constexpr int kTile = 32;
+  constexpr int kMargin = 4;
+  constexpr int kInside = (kTile - 2 * kMargin) * (kTile - 2 * kMargin);
+  for (const uint64_t seed : {1, 2}) {
+    const Exemplar exemplar(BumpyEmbedding(64, 64, 10 + seed));
+    SynthesisParams params = SmallParams();
+    params.tile_size = kTile;
+    params.seed = seed;
+    const IndexMaps maps = Synthesize(exemplar, "plane-16", params, 0);
+    int num_alike = 0;
+    for (int a = 0; a < 16; ++a) {
+      for (int b = 0; b < a; ++b) {
+        int same = 0;
+        for (int y = kMargin; y < kTile - kMargin; ++y) {
+          for (int x = kMargin; x < kTile - kMargin; ++x) {
+            same += maps.texel(a, x, y) == maps.texel(b, x, y) ? 1 : 0;
+          }
+        }
+        num_alike += same > 0.3 * kInside ? 1 : 0;
+      }
+    }
+    EXPECT_EQ(num_alike, 0) << "of 120 pairs have more than 30% in common, seed " << seed;
+  }
+}
+
 TEST(IndexMapsTest, TakesAnyEvenStripAndAnyTileOfTwiceIt) {
   const Exemplar exemplar(BumpyEmbedding(32, 48, 5));
   for (const auto& [tile, strip] : std::vector<std::array<int, 2>>{{16, 8}, {23, 10}, {33, 16}, {70, 8}}) {

@@ -1,0 +1,59 @@
+#include "btf/tiles/siblings.h"
+
+#include <algorithm>
+#include <cstddef>
+#include <vector>
+
+namespace tessera {
+namespace {
+
+// Share of a window: patches that stay below it make no two insides look alike, and those that continue a
+// frame shared with a sibling still fit.
+constexpr double kMostRepeated = 0.15;
+
+// A texel the cut brings, and where in a tile.
+struct NewTexel {
+  size_t index = 0;
+  uint32_t texel = kNoTexel;
+};
+
+}  // namespace
+
+Siblings::Siblings(std::span<const uint32_t> texels, int size, int margin, int self)
+    : texels_(texels), size_(size), margin_(margin), self_(self) {}
+
+bool Siblings::Repeats(const Exemplar& exemplar, const Window& window, const Patch& patch,
+                       const PatchCut& cut) const {
+  const int first_x = std::max(window.x, margin_);
+  const int first_y = std::max(window.y, margin_);
+  const int end_x = std::min(window.x + window.width, size_ - margin_);
+  const int end_y = std::min(window.y + window.height, size_ - margin_);
+  std::vector<NewTexel> brought;
+  for (int y = first_y; y < end_y; ++y) {
+    for (int x = first_x; x < end_x; ++x) {
+      const size_t in_window = static_cast<size_t>(y - window.y) * window.width + (x - window.x);
+      if (cut.takes_new[in_window] != 0) {
+        brought.push_back({static_cast<size_t>(y) * size_ + x,
+                           exemplar.TexelAt(patch.turn, patch.u + x - window.x, patch.v + y - window.y)});
+      }
+    }
+  }
+  const double limit = kMostRepeated * window.width * window.height;
+  if (static_cast<double>(brought.size()) <= limit) {
+    return false;
+  }
+  const size_t tile_area = static_cast<size_t>(size_) * size_;
+  const int num_tiles = static_cast<int>(texels_.size() / tile_area);
+  for (int tile = 0; tile < num_tiles; ++tile) {
+    const auto sibling = texels_.subspan(tile * tile_area, tile_area);
+    const auto num_repeated = std::count_if(brought.begin(), brought.end(), [&](const NewTexel& texel) {
+      return sibling[texel.index] == texel.texel;
+    });
+    if (tile != self_ && static_cast<double>(num_repeated) > limit) {
+      return true;
+    }
+  }
+  return false;
+}
+
+}  // namespace tessera

@@ -1,0 +1,67 @@
+#include "btf/tiles/siblings.h"
+
+#include <algorithm>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "tests/btf/tiles/noise_exemplar.h"
+
+namespace tessera {
+namespace {
+
+constexpr int kSize = 16;
+constexpr int kMargin = 2;
+constexpr Window kWindow = {2, 3, 10, 10};
+constexpr Patch kPatch = {1, 4, 5};
+
+// Three tiles: one not laid yet, one that shows the exemplar turned by kPatch.turn so that kPatch in kWindow
+// repeats it, and one that does so two texels to the side.
+std::vector<uint32_t> Tiles(const Exemplar& exemplar) {
+  std::vector<uint32_t> texels(3 * kSize * kSize, kNoTexel);
+  for (int tile = 1; tile < 3; ++tile) {
+    for (int y = 0; y < kSize; ++y) {
+      for (int x = 0; x < kSize; ++x) {
+        const int u = kPatch.u + x - kWindow.x + 2 * (tile - 1);
+        texels[(tile * kSize + y) * kSize + x] = exemplar.TexelAt(kPatch.turn, u, kPatch.v + y - kWindow.y);
+      }
+    }
+  }
+  return texels;
+}
+
+PatchCut TakingFirst(int num_texels) {
+  PatchCut cut;
+  cut.takes_new.assign(kWindow.width * kWindow.height, 0);
+  std::fill_n(cut.takes_new.begin(), num_texels, 1);
+  return cut;
+}
+
+TEST(SiblingsTest, RepeatsWhenMoreThanAShareOfTheWindowIsASiblingsInPlace) {
+  const Exemplar exemplar(BumpyEmbedding(32, 32, 1));
+  const std::vector<uint32_t> texels = Tiles(exemplar);
+  const Siblings siblings(texels, kSize, kMargin, 0);
+  EXPECT_FALSE(siblings.Repeats(exemplar, kWindow, kPatch, TakingFirst(15)));
+  EXPECT_TRUE(siblings.Repeats(exemplar, kWindow, kPatch, TakingFirst(16)));
+}
+
+TEST(SiblingsTest, IsNotItsOwnSiblingAndMayShowTheSameElsewhere) {
+  const Exemplar exemplar(BumpyEmbedding(32, 32, 2));
+  const std::vector<uint32_t> texels = Tiles(exemplar);
+  EXPECT_FALSE(Siblings(texels, kSize, kMargin, 1).Repeats(exemplar, kWindow, kPatch, TakingFirst(100)));
+  EXPECT_TRUE(Siblings(texels, kSize, kMargin, 2).Repeats(exemplar, kWindow, kPatch, TakingFirst(100)));
+  const Patch turned = {2, kPatch.u, kPatch.v};
+  EXPECT_FALSE(Siblings(texels, kSize, kMargin, 0).Repeats(exemplar, kWindow, turned, TakingFirst(100)));
+}
+
+TEST(SiblingsTest, LooksAtTheInsideOnly) {
+  const Exemplar exemplar(BumpyEmbedding(32, 32, 3));
+  const std::vector<uint32_t> texels = Tiles(exemplar);
+  // 10 x 1 texels of the window's first rows lie within a margin of 4, 10 x 9 do not; the first two columns
+  // do.
+  EXPECT_FALSE(Siblings(texels, kSize, 4, 0).Repeats(exemplar, kWindow, kPatch, TakingFirst(20)));
+  EXPECT_TRUE(Siblings(texels, kSize, 4, 0).Repeats(exemplar, kWindow, kPatch, TakingFirst(30)));
+}
+
+}  // namespace
+}  // namespace tessera
