@@ -2,9 +2,11 @@
 #include <cmath>
 #include <string>
 
+#include <absl/strings/str_format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "btf/base/reason.h"
 #include "btf/codec/codec.h"
 #include "btf/data/import.h"
 #include "btf/tiles/anisotropy.h"
@@ -32,14 +34,18 @@ TEST(WoolTilesTest, LiesInThePlaneAndIsNotTurned) {
   const absl::StatusOr<TileSet> turned =
       SynthesizeTileSet(*wool, **FindArrangement("surface-96"), params, RunContext{});
   ASSERT_EQ(turned.status().code(), absl::StatusCode::kFailedPrecondition);
-  EXPECT_THAT(std::string(turned.status().message()), HasSubstr("not isotropic: anisotropy "));
-  EXPECT_THAT(std::string(turned.status().message()), HasSubstr("limit"));
+  EXPECT_EQ(ReasonOf(turned.status()), "NOT_ISOTROPIC");
 
-  params.force = true;  // thresholds: the figures are what is looked at
   const absl::StatusOr<TileSet> set =
       SynthesizeTileSet(*wool, **FindArrangement("plane-16"), params, RunContext{});
   ASSERT_TRUE(set.ok()) << set.status();
-  EXPECT_GT(set->metadata["anisotropy"]["figure"].get<double>(), kAnisotropyLimit);
+  const double anisotropy = set->metadata["anisotropy"]["figure"].get<double>();
+  EXPECT_GT(anisotropy, kAnisotropyLimit);
+  EXPECT_THAT(std::string(turned.status().message()),
+              HasSubstr(absl::StrFormat("not isotropic: anisotropy %.2f ", anisotropy)));
+  EXPECT_THAT(std::string(turned.status().message()),
+              HasSubstr(absl::StrFormat("limit %.2f", kAnisotropyLimit)));
+  EXPECT_EQ(set->metadata["thresholds_reached"], true);
   for (const char* const part : {"borders", "insides"}) {
     for (const char* const figure : {"ratio", "ratio_p95", "ratio_worst", "ratio_run_p95"}) {
       const double value = set->certificate[part][figure].get<double>();
