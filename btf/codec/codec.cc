@@ -1,15 +1,23 @@
 #include "btf/codec/codec.h"
 
 #include <array>
+#include <span>
 
 #include "btf/codec/dsh/dsh_codec.h"
+#include "btf/codec/dsh/dsh_encoder.h"
 
 namespace tessera {
 namespace {
 
-const std::array<const Codec*, 1>& Codecs() {
-  static const DshClsCodec dsh_cls;
-  static const std::array<const Codec*, 1> codecs = {&dsh_cls};
+std::span<const Codec* const> Codecs() {
+  static const DshCodec dsh_cls("dsh-cls", &EncodeDshCls);
+  static const DshCodec dsh("dsh", &EncodeDsh);
+  static const DshCodec dsh_ls("dsh-ls", &EncodeDshLs);
+  static const std::array codecs = {
+      static_cast<const Codec*>(&dsh_cls),
+      static_cast<const Codec*>(&dsh),
+      static_cast<const Codec*>(&dsh_ls),
+  };
   return codecs;
 }
 

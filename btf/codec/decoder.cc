@@ -29,6 +29,8 @@ struct KnownCodec {
 
 constexpr std::array kKnownCodecs = {
     KnownCodec{"dsh-cls", 1, &Make<DshDecoder>},
+    KnownCodec{"dsh", 1, &Make<DshDecoder>},
+    KnownCodec{"dsh-ls", 1, &Make<DshDecoder>},
 };
 
 // Sum of w[i] * codes[i]; lanes of their own, so that it vectorises without reordering a sum.

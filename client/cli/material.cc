@@ -32,11 +32,12 @@ struct CodecFlags {
 };
 
 void AddCodecFlags(CLI::App* command, CodecFlags& flags) {
-  command->add_option("--codec", flags.codec, "Codec id")->capture_default_str();
-  command->add_option("--kl", flags.kl, "Light coefficients: 1, 4, 9, 16, 25, 36 or 49")
+  command->add_option("--codec", flags.codec, fmt::format("Codec id: {}", fmt::join(CodecIds(), ", ")))
       ->capture_default_str();
-  command->add_option("--kv", flags.kv, "View coefficients, likewise")->capture_default_str();
-  command->add_option("--cls-energy", flags.cls_energy, "Energy bound of the codec")
+  command->add_option("--kl", flags.kl, "dsh*: light coefficients, 1, 4, 9, 16, 25, 36 or 49")
+      ->capture_default_str();
+  command->add_option("--kv", flags.kv, "dsh*: view coefficients, likewise")->capture_default_str();
+  command->add_option("--cls-energy", flags.cls_energy, "dsh-cls: energy bound")
       ->check(CLI::IsMember({"hemisphere", "sphere"}))
       ->capture_default_str();
 }

@@ -1,22 +1,21 @@
 #include "btf/codec/dsh/dsh_codec.h"
 
 #include "btf/codec/dsh/dsh_embedding.h"
-#include "btf/codec/dsh/dsh_encoder.h"
 #include "btf/codec/dsh/dsh_glsl.h"
 
 namespace tessera {
 
-absl::StatusOr<Material> DshClsCodec::Encode(BtfSource& source, const EncodeParams& params,
-                                             const RunContext& context) const {
-  return EncodeDshCls(source, params, context);
+absl::StatusOr<Material> DshCodec::Encode(BtfSource& source, const EncodeParams& params,
+                                          const RunContext& context) const {
+  return encoder_(source, params, context);
 }
 
-absl::StatusOr<Embedding> DshClsCodec::Embed(const Material& material, int dims,
-                                             const RunContext& context) const {
+absl::StatusOr<Embedding> DshCodec::Embed(const Material& material, int dims,
+                                          const RunContext& context) const {
   return EmbedDsh(material, dims, context);
 }
 
-absl::StatusOr<CodecGlsl> DshClsCodec::Glsl(const BtfelTable& table) const {
+absl::StatusOr<CodecGlsl> DshCodec::Glsl(const BtfelTable& table) const {
   return DshGlsl(table);
 }
 

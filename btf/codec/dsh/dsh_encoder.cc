@@ -12,190 +12,44 @@
 
 #include <absl/strings/str_cat.h>
 #include <Eigen/Core>
+#include <nlohmann/json.hpp>
 
 #include "btf/base/parallel.h"
 #include "btf/base/status_macros.h"
 #include "btf/codec/dsh/coefficient_store.h"
+#include "btf/codec/dsh/dsh_basis.h"
+#include "btf/codec/dsh/dsh_fitter.h"
 #include "btf/codec/quantize.h"
-#include "btf/math/constrained_least_squares.h"
+#include "btf/math/ridge.h"
 #include "btf/math/spherical_harmonics.h"
 
 namespace tessera {
 namespace {
 
-using Solver = ClsSolver<float>;
-using MatrixMap = Eigen::Map<const Eigen::MatrixXf>;
-
-// Signals fitted together, about: few enough for the products' operands to stay in the second-level cache
-// (and Eigen's copies of them on the stack), enough to fill vectors where there are few views. Sums are
-// formed within a signal only, and groups are cut the same way for any budget and number of threads.
-constexpr int64_t kSignalsPerGroup = 256;
 constexpr int64_t kSamplesPerTask = 1 << 18;
 // More rows at once gain nothing.
 constexpr uint64_t kMaxRowBlockBytes = uint64_t{64} << 20;
 
-Eigen::Index PadToLanes(Eigen::Index rows) {
-  return (rows + Solver::kLanes - 1) / Solver::kLanes * Solver::kLanes;
-}
-
-// sum f^2 in a fixed order whatever the address, which decides how a library would cut the sum.
-float SumOfSquares(const float* f, Eigen::Index count) {
-  using Lanes = Eigen::Array<float, 8, 1>;
-  constexpr Eigen::Index kWidth = Lanes::SizeAtCompileTime;
-  Lanes even = Lanes::Zero();  // two sums, so that one addition need not wait for the other
-  Lanes odd = Lanes::Zero();
-  Eigen::Index i = 0;
-  for (; i + 2 * kWidth <= count; i += 2 * kWidth) {
-    even += Eigen::Map<const Lanes>(f + i).square();
-    odd += Eigen::Map<const Lanes>(f + i + kWidth).square();
-  }
-  float rest = 0.0F;
-  for (; i < count; ++i) {
-    rest += f[i] * f[i];
-  }
-  even += odd;
-  return rest + even.sum();
-}
-
-bool IsLegalSample(float f) {
-  return std::abs(f) <= kMaxSample;
-}
-
-double SolidAngle(ClsEnergy energy) {
-  return energy == ClsEnergy::kHemisphere ? 2.0 * kPi : 4.0 * kPi;
-}
-
-Eigen::MatrixXd BasisOf(const std::vector<Direction>& directions, int num_functions) {
-  Eigen::Matrix3Xd vectors(3, directions.size());
-  for (size_t i = 0; i < directions.size(); ++i) {
-    vectors.col(static_cast<Eigen::Index>(i)) = VectorFromDirection(directions[i]);
-  }
-  return ShMatrix(num_functions, vectors);
-}
-
-// Intermediate results of one group of texels.
-struct Scratch {
-  Eigen::MatrixXf projected;  // [signals, padded][kl], then [kv]
-  Eigen::VectorXf energies;
-  Eigen::MatrixXf view_samples;  // [views][(texel, channel, i)]
-  Eigen::MatrixXf coefficients;  // [(texel, channel, i)][kv]
-};
-
 // Scratch that outlives its task: returned to the system after each, its pages would be faulted in again.
 class ScratchPool {
  public:
-  std::unique_ptr<Scratch> Take() {
+  std::unique_ptr<DshScratch> Take() {
     const std::lock_guard lock(mutex_);
     if (free_.empty()) {
-      return std::make_unique<Scratch>();
+      return std::make_unique<DshScratch>();
     }
-    std::unique_ptr<Scratch> scratch = std::move(free_.back());
+    std::unique_ptr<DshScratch> scratch = std::move(free_.back());
     free_.pop_back();
     return scratch;
   }
-  void Return(std::unique_ptr<Scratch> scratch) {
+  void Return(std::unique_ptr<DshScratch> scratch) {
     const std::lock_guard lock(mutex_);
     free_.push_back(std::move(scratch));
   }
 
  private:
   std::mutex mutex_;
-  std::vector<std::unique_ptr<Scratch>> free_;  // guarded by mutex_
-};
-
-// Both passes for groups of texels. Immutable; each task brings its own scratch.
-class GroupFitter {
- public:
-  GroupFitter(const BtfInfo& info, const EncodeParams& params)
-      : num_lights_(static_cast<Eigen::Index>(info.lights.size())),
-        num_views_(static_cast<Eigen::Index>(info.views.size())),
-        kl_(params.kl),
-        kv_(params.kv),
-        light_energy_scale_(
-            static_cast<float>(SolidAngle(params.cls_energy) / static_cast<double>(num_lights_))),
-        view_energy_scale_(
-            static_cast<float>(SolidAngle(params.cls_energy) / static_cast<double>(num_views_))),
-        light_solver_(BasisOf(info.lights, params.kl)),
-        view_solver_(BasisOf(info.views, params.kv)) {}
-
-  [[nodiscard]] int64_t TexelsPerGroup() const {
-    return std::max<int64_t>(1, kSignalsPerGroup / (3 * std::max<int64_t>(num_views_, kl_)));
-  }
-  [[nodiscard]] size_t SamplesPerTexel() const { return static_cast<size_t>(3 * num_views_ * num_lights_); }
-  [[nodiscard]] size_t CoefficientsPerTexel() const { return static_cast<size_t>(3) * kl_ * kv_; }
-
-  // samples [texel][channel][view][light] -> coefficients [texel][(channel * kv + j) * kl + i]. False when a
-  // sample is not finite or beyond kMaxSample; the coefficients are then undefined.
-  bool Fit(const float* samples, int num_texels, float* coefficients, Scratch& scratch) const {
-    const Eigen::Index num_blocks = Eigen::Index{3} * num_texels;  // (texel, channel)
-    const Eigen::Index num_signals = num_blocks * num_views_;
-    if (!FitLights(samples, num_signals, scratch)) {
-      return false;
-    }
-    // Back to harmonics, and at once with the views running fastest, as the second pass wants them.
-    scratch.view_samples.resize(num_views_, num_blocks * kl_);
-    for (Eigen::Index block = 0; block < num_blocks; ++block) {
-      scratch.view_samples.middleCols(block * kl_, kl_).noalias() =
-          scratch.projected.middleRows(block * num_views_, num_views_) *
-          light_solver_.eigenvectors().transpose();
-    }
-    FitViews(num_blocks * kl_, scratch);
-    for (Eigen::Index block = 0; block < num_blocks; ++block) {
-      for (Eigen::Index j = 0; j < kv_; ++j) {
-        std::copy_n(scratch.coefficients.col(j).data() + block * kl_, kl_, coefficients);
-        coefficients += kl_;
-      }
-    }
-    return true;
-  }
-
- private:
-  bool FitLights(const float* samples, Eigen::Index num_signals, Scratch& scratch) const {
-    const Eigen::Index padded = PadToLanes(num_signals);
-    scratch.energies.resize(padded);
-    for (Eigen::Index s = 0; s < num_signals; ++s) {
-      const float* const f = samples + s * num_lights_;
-      const float sum = SumOfSquares(f, num_lights_);
-      // One look at the sum clears almost every signal; NaN fails every comparison.
-      if (!(sum <= kMaxSample * kMaxSample) && !std::all_of(f, f + num_lights_, IsLegalSample)) {
-        return false;
-      }
-      scratch.energies[s] = light_energy_scale_ * sum;
-    }
-    scratch.energies.tail(padded - num_signals).setZero();
-    scratch.projected.resize(padded, kl_);
-    scratch.projected.topRows(num_signals).noalias() =
-        MatrixMap(samples, num_lights_, num_signals).transpose() * light_solver_.projection().transpose();
-    scratch.projected.bottomRows(padded - num_signals).setZero();
-    light_solver_.Shrink(scratch.energies, scratch.projected);
-    return true;
-  }
-
-  void FitViews(Eigen::Index num_signals, Scratch& scratch) const {
-    const Eigen::Index padded = PadToLanes(num_signals);
-    scratch.energies.resize(padded);
-    for (Eigen::Index s = 0; s < num_signals; ++s) {
-      scratch.energies[s] = view_energy_scale_ * SumOfSquares(scratch.view_samples.col(s).data(), num_views_);
-    }
-    scratch.energies.tail(padded - num_signals).setZero();
-    scratch.projected.resize(padded, kv_);
-    scratch.projected.topRows(num_signals).noalias() =
-        scratch.view_samples.transpose() * view_solver_.projection().transpose();
-    scratch.projected.bottomRows(padded - num_signals).setZero();
-    view_solver_.Shrink(scratch.energies, scratch.projected);
-    scratch.coefficients.resize(num_signals, kv_);
-    scratch.coefficients.noalias() =
-        scratch.projected.topRows(num_signals) * view_solver_.eigenvectors().transpose();
-  }
-
-  Eigen::Index num_lights_;
-  Eigen::Index num_views_;
-  Eigen::Index kl_;
-  Eigen::Index kv_;
-  float light_energy_scale_;
-  float view_energy_scale_;
-  Solver light_solver_;
-  Solver view_solver_;
+  std::vector<std::unique_ptr<DshScratch>> free_;  // guarded by mutex_
 };
 
 absl::Status CheckDirections(const std::vector<Direction>& directions, const char* name) {
@@ -267,7 +121,7 @@ struct Ranges {
 };
 
 // Fits rows of samples into `coefficients` [row][x][k] and widens `ranges`. False on an illegal sample.
-bool FitRows(const GroupFitter& fitter, int width, int num_rows, std::span<const float> samples,
+bool FitRows(const DshFitter& fitter, int width, int num_rows, std::span<const float> samples,
              std::span<float> coefficients, Ranges& ranges, ScratchPool& pool, const RunContext& context) {
   const size_t k = fitter.CoefficientsPerTexel();
   const int64_t texels_per_group = fitter.TexelsPerGroup();
@@ -277,7 +131,7 @@ bool FitRows(const GroupFitter& fitter, int width, int num_rows, std::span<const
   std::atomic<bool> is_legal = true;
   std::mutex mutex;  // guards `ranges`
   ParallelFor(context, 0, groups_per_row * num_rows, groups_per_task, [&](int64_t begin, int64_t end) {
-    std::unique_ptr<Scratch> scratch = pool.Take();
+    std::unique_ptr<DshScratch> scratch = pool.Take();
     Ranges local(k);
     for (int64_t group = begin; group < end; ++group) {
       const int64_t x = group % groups_per_row * texels_per_group;
@@ -300,10 +154,12 @@ bool FitRows(const GroupFitter& fitter, int width, int num_rows, std::span<const
   return is_legal;
 }
 
-CodecTable Identity(int n) {
-  CodecTable table{{n, n}, std::vector<float>(static_cast<size_t>(n) * n, 0.0F)};
-  for (int i = 0; i < n; ++i) {
-    table.values[static_cast<size_t>(i) * n + i] = 1.0F;
+CodecTable TableOf(const Eigen::MatrixXd& basis) {
+  CodecTable table{{basis.rows(), basis.cols()}, {}};
+  for (Eigen::Index i = 0; i < basis.rows(); ++i) {
+    for (Eigen::Index j = 0; j < basis.cols(); ++j) {
+      table.values.push_back(static_cast<float>(basis(i, j)));
+    }
   }
   return table;
 }
@@ -313,13 +169,19 @@ int RowsWithin(uint64_t bytes, uint64_t bytes_per_row, int height) {
   return static_cast<int>(std::clamp<uint64_t>(bytes / bytes_per_row, 1, static_cast<uint64_t>(height)));
 }
 
-}  // namespace
+// How one codec fits, and what its tables say.
+struct Model {
+  std::string codec_id;
+  std::unique_ptr<DshFitter> fitter;
+  Eigen::MatrixXd basis_light;
+  Eigen::MatrixXd basis_view;
+  nlohmann::json parameters;
+};
 
-absl::StatusOr<Material> EncodeDshCls(BtfSource& source, const EncodeParams& params,
-                                      const RunContext& context) {
+absl::StatusOr<Material> EncodeWith(const Model& model, BtfSource& source, const EncodeParams& params,
+                                    const RunContext& context) {
   const BtfInfo& info = source.info();
-  TESSERA_RETURN_IF_ERROR(CheckInput(info, params));
-  const GroupFitter fitter(info, params);
+  const DshFitter& fitter = *model.fitter;
   const size_t k = fitter.CoefficientsPerTexel();
   const size_t values_per_row = static_cast<size_t>(info.width) * k;
   const uint64_t sample_row_bytes = source.SamplesPerRow() * sizeof(float);
@@ -366,13 +228,11 @@ absl::StatusOr<Material> EncodeDshCls(BtfSource& source, const EncodeParams& par
   material.provenance = info.provenance;
   material.radiometry = info.radiometry;
   BtfelTable& table = material.btfels;
-  table.codec_id = "dsh-cls";
+  table.codec_id = model.codec_id;
   table.codec_version = 1;
   table.num_coefficients = static_cast<int>(k);
-  table.tables = {{"basis_light", Identity(params.kl)}, {"basis_view", Identity(params.kv)}};
-  table.parameters = {{"kl", params.kl},
-                      {"kv", params.kv},
-                      {"cls_energy", params.cls_energy == ClsEnergy::kHemisphere ? "hemisphere" : "sphere"}};
+  table.tables = {{"basis_light", TableOf(model.basis_light)}, {"basis_view", TableOf(model.basis_view)}};
+  table.parameters = model.parameters;
   table.views = info.views;
   table.lights = info.lights;
   Quantisation quantisation = UniformQuantisation(ranges.minima, ranges.maxima);
@@ -395,6 +255,108 @@ absl::StatusOr<Material> EncodeDshCls(BtfSource& source, const EncodeParams& par
   table.offset = std::move(quantisation.offset);
   table.step = std::move(quantisation.step);
   return material;
+}
+
+// Samples of texels that a ridge is chosen by, as signals over the lights: [lights][(texel, channel, view)].
+// Texels are spread evenly over up to kRidgeRows rows, up to kRidgeTexels of each; those with illegal samples
+// are left out, for the encoder to name.
+absl::StatusOr<Eigen::MatrixXd> RidgeSamples(BtfSource& source, const RunContext& context) {
+  constexpr int kRidgeRows = 8;
+  constexpr int kRidgeTexels = 32;
+  const BtfInfo& info = source.info();
+  const int num_rows = std::min(kRidgeRows, info.height);
+  const int num_texels = std::min(kRidgeTexels, info.width);
+  const Eigen::Index num_lights = static_cast<Eigen::Index>(info.lights.size());
+  const Eigen::Index signals_per_texel = static_cast<Eigen::Index>(3 * info.views.size());
+  const auto spread = [](int i, int count, int extent) {
+    return static_cast<int>((2 * int64_t{i} + 1) * extent / (2 * int64_t{count}));
+  };
+  RunContext source_context = context;
+  source_context.progress = nullptr;
+  Eigen::MatrixXd signals(num_lights, signals_per_texel * num_rows * num_texels);
+  Eigen::Index num_signals = 0;
+  auto row = std::make_unique_for_overwrite<float[]>(source.SamplesPerRow());
+  for (int y = 0; y < num_rows; ++y) {
+    TESSERA_RETURN_IF_ERROR(context.CheckStop());
+    TESSERA_RETURN_IF_ERROR(source.ReadRows(spread(y, num_rows, info.height), 1,
+                                            std::span(row.get(), source.SamplesPerRow()), source_context));
+    for (int x = 0; x < num_texels; ++x) {
+      const Eigen::Map<const Eigen::MatrixXf> texel(
+          row.get() + spread(x, num_texels, info.width) * signals_per_texel * num_lights, num_lights,
+          signals_per_texel);
+      if (std::all_of(texel.data(), texel.data() + texel.size(), IsLegalSample)) {
+        signals.middleCols(num_signals, signals_per_texel) = texel.cast<double>();
+        num_signals += signals_per_texel;
+      }
+    }
+  }
+  signals.conservativeResize(Eigen::NoChange, num_signals);
+  return signals;
+}
+
+// Light coefficients [kl][(texel, channel, view)] as signals over the views, [views][(texel, channel, i)].
+Eigen::MatrixXd ViewSignals(const Eigen::MatrixXd& light_coefficients, Eigen::Index num_views) {
+  const Eigen::Index kl = light_coefficients.rows();
+  const Eigen::Index num_blocks = light_coefficients.cols() / num_views;
+  Eigen::MatrixXd signals(num_views, num_blocks * kl);
+  for (Eigen::Index block = 0; block < num_blocks; ++block) {
+    signals.middleCols(block * kl, kl) =
+        light_coefficients.middleCols(block * num_views, num_views).transpose();
+  }
+  return signals;
+}
+
+}  // namespace
+
+absl::StatusOr<Material> EncodeDshCls(BtfSource& source, const EncodeParams& params,
+                                      const RunContext& context) {
+  TESSERA_RETURN_IF_ERROR(CheckInput(source.info(), params));
+  return EncodeWith(
+      {.codec_id = "dsh-cls",
+       .fitter = MakeConstrainedFitter(source.info(), params),
+       .basis_light = Eigen::MatrixXd::Identity(params.kl, params.kl),
+       .basis_view = Eigen::MatrixXd::Identity(params.kv, params.kv),
+       .parameters = {{"kl", params.kl},
+                      {"kv", params.kv},
+                      {"cls_energy", params.cls_energy == ClsEnergy::kHemisphere ? "hemisphere" : "sphere"}}},
+      source, params, context);
+}
+
+absl::StatusOr<Material> EncodeDshLs(BtfSource& source, const EncodeParams& params,
+                                     const RunContext& context) {
+  const BtfInfo& info = source.info();
+  TESSERA_RETURN_IF_ERROR(CheckInput(info, params));
+  return EncodeWith({.codec_id = "dsh-ls",
+                     .fitter = MakeLinearFitter(
+                         LeastSquaresFit(DshSamplesOfBasis(info.lights, params.kl), kDshLsSingularFloor),
+                         LeastSquaresFit(DshSamplesOfBasis(info.views, params.kv), kDshLsSingularFloor)),
+                     .basis_light = Eigen::MatrixXd::Identity(params.kl, params.kl),
+                     .basis_view = Eigen::MatrixXd::Identity(params.kv, params.kv),
+                     .parameters = {{"kl", params.kl}, {"kv", params.kv}}},
+                    source, params, context);
+}
+
+absl::StatusOr<Material> EncodeDsh(BtfSource& source, const EncodeParams& params, const RunContext& context) {
+  const BtfInfo& info = source.info();
+  TESSERA_RETURN_IF_ERROR(CheckInput(info, params));
+  Eigen::MatrixXd basis_light = OrthonormalDshBasis(params.kl, DshArgument::kLight, MaxThetaRad(info.lights));
+  Eigen::MatrixXd basis_view = OrthonormalDshBasis(params.kv, DshArgument::kView, MaxThetaRad(info.views));
+  const RidgeRegression light(DshSamplesOfBasis(info.lights, params.kl) * basis_light.transpose());
+  const RidgeRegression view(DshSamplesOfBasis(info.views, params.kv) * basis_view.transpose());
+  TESSERA_ASSIGN_OR_RETURN(const Eigen::MatrixXd samples, RidgeSamples(source, context));
+  const double light_ridge = light.ChooseRidge(samples);
+  const Eigen::MatrixXd light_fit = light.Fit(light_ridge);
+  const double view_ridge =
+      view.ChooseRidge(ViewSignals(light_fit * samples, static_cast<Eigen::Index>(info.views.size())));
+  return EncodeWith({.codec_id = "dsh",
+                     .fitter = MakeLinearFitter(light_fit, view.Fit(view_ridge)),
+                     .basis_light = std::move(basis_light),
+                     .basis_view = std::move(basis_view),
+                     .parameters = {{"kl", params.kl},
+                                    {"kv", params.kv},
+                                    {"ridge_light", light_ridge},
+                                    {"ridge_view", view_ridge}}},
+                    source, params, context);
 }
 
 }  // namespace tessera

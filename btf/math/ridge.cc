@@ -1,0 +1,77 @@
+#include "btf/math/ridge.h"
+
+#include <algorithm>
+#include <cassert>
+#include <cmath>
+#include <vector>
+
+#include <Eigen/Eigenvalues>
+#include <Eigen/SVD>
+
+namespace tessera {
+namespace {
+
+// Eigenvalues below this share of the largest are rounding of 0.
+constexpr double kNullEigenvalue = 1e-14;
+
+}  // namespace
+
+RidgeRegression::RidgeRegression(const Eigen::MatrixXd& basis) {
+  assert(basis.allFinite() && basis.size() > 0);
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(basis.transpose() * basis);
+  eigenvectors_ = eigen.eigenvectors();
+  projection_ = eigenvectors_.transpose() * basis.transpose();
+  // The squared row norms are the eigenvalues; unlike the solver's they cannot be negative in a null space.
+  eigenvalues_ = projection_.rowwise().squaredNorm();
+}
+
+double RidgeRegression::ChooseRidge(const Eigen::Ref<const Eigen::MatrixXd>& signals) const {
+  const double num_samples = static_cast<double>(projection_.cols());
+  assert(signals.rows() == projection_.cols());
+  const double largest = eigenvalues_.maxCoeff();
+  // By eigenvector, the part of the signals' energy that lies along it; what is left no fit can reach.
+  Eigen::ArrayXd energies = (projection_ * signals).rowwise().squaredNorm();
+  double unreachable = signals.squaredNorm();
+  for (Eigen::Index i = 0; i < energies.size(); ++i) {
+    energies[i] = eigenvalues_[i] > kNullEigenvalue * largest ? energies[i] / eigenvalues_[i] : 0.0;
+    unreachable -= energies[i];
+  }
+  unreachable = std::max(unreachable, 0.0);
+
+  std::vector<double> ridges;
+  std::vector<double> scores;
+  const int count = static_cast<int>(std::lround(std::log10(kMaxRidge / kMinRidge) * kRidgesPerDecade)) + 1;
+  for (int step = 0; step < count; ++step) {
+    const double ridge = largest * kMinRidge * std::pow(10.0, step / static_cast<double>(kRidgesPerDecade));
+    double residual = unreachable;
+    double freedom = num_samples;  // M - trace H
+    for (Eigen::Index i = 0; i < energies.size(); ++i) {
+      if (eigenvalues_[i] > kNullEigenvalue * largest) {
+        const double lost = ridge / (eigenvalues_[i] + ridge);
+        residual += lost * lost * energies[i];
+        freedom -= 1.0 - lost;
+      }
+    }
+    ridges.push_back(ridge);
+    scores.push_back(residual / (freedom * freedom));
+  }
+  const double limit = *std::ranges::min_element(scores) * (1.0 + kScoreTolerance);
+  const auto found = std::ranges::find_if(scores, [&](double score) { return score <= limit; });
+  return found == scores.end() ? ridges.front() : ridges[static_cast<size_t>(found - scores.begin())];
+}
+
+Eigen::MatrixXd RidgeRegression::Fit(double ridge) const {
+  const Eigen::VectorXd gains =
+      (eigenvalues_.array() + ridge > 0.0).select((eigenvalues_.array() + ridge).inverse(), 0.0).matrix();
+  return eigenvectors_ * gains.asDiagonal() * projection_;
+}
+
+Eigen::MatrixXd LeastSquaresFit(const Eigen::MatrixXd& basis, double relative_floor) {
+  const Eigen::JacobiSVD<Eigen::MatrixXd> svd(basis, Eigen::ComputeThinU | Eigen::ComputeThinV);
+  const double floor = relative_floor * svd.singularValues().maxCoeff();
+  const Eigen::VectorXd inverse =
+      (svd.singularValues().array() > floor).select(svd.singularValues().array().inverse(), 0.0).matrix();
+  return svd.matrixV() * inverse.asDiagonal() * svd.matrixU().transpose();
+}
+
+}  // namespace tessera

@@ -1,0 +1,51 @@
+// Ridge regression with one ridge for many signals, chosen by generalised cross-validation.
+//
+// For samples f (M of them) and basis Y [M][n]: c = (Y^T Y + ridge I)^-1 Y^T f, a linear map for a given
+// ridge. The ridge is that of the least score
+//
+//   GCV(ridge) = (sum over signals |f - Y c|^2) / (M - trace H)^2,   H = Y (Y^T Y + ridge I)^-1 Y^T,
+//
+// the error of leaving out each sample in turn, made independent of the choice of coordinates (Golub, Heath
+// and Wahba 1979, Technometrics 21). With Y^T Y = Q diag(w) Q^T and p = Q^T Y^T f it takes sums over the
+// signals of p_i^2 and |f|^2 only.
+//
+//   RidgeRegression regression(basis);
+//   const double ridge = regression.ChooseRidge(signals);   // a sample of them is enough
+//   coefficients = regression.Fit(ridge) * all_signals;
+#pragma once
+
+#include <Eigen/Core>
+
+namespace tessera {
+
+// Immutable after construction, safe to share between threads.
+class RidgeRegression {
+ public:
+  // The ridges tried: kRidgesPerDecade from kMinRidge to kMaxRidge, relative to the largest eigenvalue w.
+  static constexpr double kMinRidge = 1e-6;
+  static constexpr double kMaxRidge = 10.0;
+  static constexpr int kRidgesPerDecade = 8;
+  // Scores are estimates and flat near the least: of the ridges within this share of it, the smallest is
+  // taken, the closest to the samples. It also settles ties (one sample, signals that are 0).
+  static constexpr double kScoreTolerance = 0.01;
+
+  // basis [M][n], both >= 1, finite; M < n is fine. Cost n^3.
+  explicit RidgeRegression(const Eigen::MatrixXd& basis);
+
+  // One of the ridges above, absolute, for finite signals [M][any number]. 0 when the basis is 0.
+  [[nodiscard]] double ChooseRidge(const Eigen::Ref<const Eigen::MatrixXd>& signals) const;
+
+  // [n][M]; ridge > 0, or 0 for a basis of 0 (then 0).
+  [[nodiscard]] Eigen::MatrixXd Fit(double ridge) const;
+
+ private:
+  Eigen::MatrixXd eigenvectors_;  // Q
+  Eigen::MatrixXd projection_;    // Q^T Y^T
+  Eigen::VectorXd eigenvalues_;   // w
+};
+
+// The pseudo-inverse of basis [M][n], [n][M]: plain least squares, the smallest coefficients of those that
+// fit equally well. Singular values below `relative_floor` of the largest count as 0.
+[[nodiscard]] Eigen::MatrixXd LeastSquaresFit(const Eigen::MatrixXd& basis, double relative_floor);
+
+}  // namespace tessera
