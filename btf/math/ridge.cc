@@ -25,7 +25,8 @@ RidgeRegression::RidgeRegression(const Eigen::MatrixXd& basis) {
   eigenvalues_ = projection_.rowwise().squaredNorm();
 }
 
-double RidgeRegression::ChooseRidge(const Eigen::Ref<const Eigen::MatrixXd>& signals) const {
+double RidgeRegression::ChooseRidge(const Eigen::Ref<const Eigen::MatrixXd>& signals,
+                                    double max_ridge) const {
   const double num_samples = static_cast<double>(projection_.cols());
   assert(signals.rows() == projection_.cols());
   const double largest = eigenvalues_.maxCoeff();
@@ -40,7 +41,7 @@ double RidgeRegression::ChooseRidge(const Eigen::Ref<const Eigen::MatrixXd>& sig
 
   std::vector<double> ridges;
   std::vector<double> scores;
-  const int count = static_cast<int>(std::lround(std::log10(kMaxRidge / kMinRidge) * kRidgesPerDecade)) + 1;
+  const int count = static_cast<int>(std::lround(std::log10(max_ridge / kMinRidge) * kRidgesPerDecade)) + 1;
   for (int step = 0; step < count; ++step) {
     const double ridge = largest * kMinRidge * std::pow(10.0, step / static_cast<double>(kRidgesPerDecade));
     double residual = unreachable;

@@ -10,7 +10,7 @@
 // signals of p_i^2 and |f|^2 only.
 //
 //   RidgeRegression regression(basis);
-//   const double ridge = regression.ChooseRidge(signals);   // a sample of them is enough
+//   const double ridge = regression.ChooseRidge(signals, 10.0);   // a sample of them is enough
 //   coefficients = regression.Fit(ridge) * all_signals;
 #pragma once
 
@@ -21,9 +21,8 @@ namespace tessera {
 // Immutable after construction, safe to share between threads.
 class RidgeRegression {
  public:
-  // The ridges tried: kRidgesPerDecade from kMinRidge to kMaxRidge, relative to the largest eigenvalue w.
+  // The ridges tried: kRidgesPerDecade from kMinRidge on, relative to the largest eigenvalue w.
   static constexpr double kMinRidge = 1e-6;
-  static constexpr double kMaxRidge = 10.0;
   static constexpr int kRidgesPerDecade = 8;
   // Scores are estimates and flat near the least: of the ridges within this share of it, the smallest is
   // taken, the closest to the samples. It also settles ties (one sample, signals that are 0).
@@ -32,8 +31,9 @@ class RidgeRegression {
   // basis [M][n], both >= 1, finite; M < n is fine. Cost n^3.
   explicit RidgeRegression(const Eigen::MatrixXd& basis);
 
-  // One of the ridges above, absolute, for finite signals [M][any number]. 0 when the basis is 0.
-  [[nodiscard]] double ChooseRidge(const Eigen::Ref<const Eigen::MatrixXd>& signals) const;
+  // One of the ridges above up to max_ridge (> kMinRidge, relative as well), absolute, for finite signals
+  // [M][any number]. 0 when the basis is 0.
+  [[nodiscard]] double ChooseRidge(const Eigen::Ref<const Eigen::MatrixXd>& signals, double max_ridge) const;
 
   // [n][M]; ridge > 0, or 0 for a basis of 0 (then 0).
   [[nodiscard]] Eigen::MatrixXd Fit(double ridge) const;

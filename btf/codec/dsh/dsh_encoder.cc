@@ -344,10 +344,10 @@ absl::StatusOr<Material> EncodeDsh(BtfSource& source, const EncodeParams& params
   const RidgeRegression light(DshSamplesOfBasis(info.lights, params.kl) * basis_light.transpose());
   const RidgeRegression view(DshSamplesOfBasis(info.views, params.kv) * basis_view.transpose());
   TESSERA_ASSIGN_OR_RETURN(const Eigen::MatrixXd samples, RidgeSamples(source, context));
-  const double light_ridge = light.ChooseRidge(samples);
+  const double light_ridge = light.ChooseRidge(samples, kDshMaxRidge);
   const Eigen::MatrixXd light_fit = light.Fit(light_ridge);
-  const double view_ridge =
-      view.ChooseRidge(ViewSignals(light_fit * samples, static_cast<Eigen::Index>(info.views.size())));
+  const double view_ridge = view.ChooseRidge(
+      ViewSignals(light_fit * samples, static_cast<Eigen::Index>(info.views.size())), kDshMaxRidge);
   return EncodeWith({.codec_id = "dsh",
                      .fitter = MakeLinearFitter(light_fit, view.Fit(view_ridge)),
                      .basis_light = std::move(basis_light),

@@ -66,10 +66,11 @@ TEST(RidgeRegressionTest, ChoosesTheLeastScore) {
   double previous = 0.0;
   for (const double noise : {0.0, 0.3, 3.0}) {
     const Eigen::MatrixXd f = y * truth + noise * Random(30, 40, 4);
-    const double ridge = RidgeRegression(y).ChooseRidge(f);
+    const double ridge = RidgeRegression(y).ChooseRidge(f, 10.0);
     EXPECT_NEAR(ridge / SlowChoice(y, f, largest), 1.0, 1e-6) << noise;
     EXPECT_GT(ridge, previous) << "more noise, more ridge";
     previous = ridge;
+    EXPECT_LE(RidgeRegression(y).ChooseRidge(f, 0.01), 0.0101 * largest);
   }
 }
 
@@ -79,20 +80,20 @@ TEST(RidgeRegressionTest, NoiseIsKeptOut) {
   const Eigen::MatrixXd clean = y * Random(25, 100, 6);
   const Eigen::MatrixXd noisy = clean + 2.0 * Random(20, 100, 7);
   const RidgeRegression regression(y);
-  const double chosen = (y * regression.Fit(regression.ChooseRidge(noisy)) * noisy - clean).norm();
+  const double chosen = (y * regression.Fit(regression.ChooseRidge(noisy, 10.0)) * noisy - clean).norm();
   EXPECT_LT(chosen, 0.95 * (noisy - clean).norm());
 }
 
 TEST(RidgeRegressionTest, TiesTakeTheSmallestRidge) {
   // One sample: every ridge scores the same. Signals of 0: all scores are 0.
   const Eigen::MatrixXd one = Eigen::MatrixXd::Constant(1, 1, 2.0);
-  EXPECT_NEAR(RidgeRegression(one).ChooseRidge(Eigen::MatrixXd::Constant(1, 3, 0.7)), 4e-6, 1e-12);
+  EXPECT_NEAR(RidgeRegression(one).ChooseRidge(Eigen::MatrixXd::Constant(1, 3, 0.7), 10.0), 4e-6, 1e-12);
   const Eigen::MatrixXd y = Random(10, 4, 8);
-  const double black = RidgeRegression(y).ChooseRidge(Eigen::MatrixXd::Zero(10, 3));
+  const double black = RidgeRegression(y).ChooseRidge(Eigen::MatrixXd::Zero(10, 3), 10.0);
   EXPECT_GT(black, 0.0);
-  EXPECT_EQ(RidgeRegression(y).ChooseRidge(Eigen::MatrixXd(10, 0)), black);
+  EXPECT_EQ(RidgeRegression(y).ChooseRidge(Eigen::MatrixXd(10, 0), 10.0), black);
   const RidgeRegression nothing(Eigen::MatrixXd::Zero(3, 2));
-  EXPECT_EQ(nothing.ChooseRidge(Eigen::MatrixXd::Ones(3, 1)), 0.0);
+  EXPECT_EQ(nothing.ChooseRidge(Eigen::MatrixXd::Ones(3, 1), 10.0), 0.0);
   EXPECT_EQ(nothing.Fit(0.0).cwiseAbs().maxCoeff(), 0.0);
 }
 
