@@ -19,13 +19,16 @@
 namespace tessera {
 namespace {
 
+// Between spots and worms: spots and short worms, 8 to 11 texels apart and seldom longer than 16, so that
+// they fit the strips of a tile set (16 texels high by default). A smaller kKill makes longer worms.
 constexpr float kFeed = 0.046F;
-constexpr float kKill = 0.0646F;
-constexpr float kDiffusionU = 0.26F;  // cells^2 per step: features 10 to 16 texels apart
-constexpr float kDiffusionV = 0.13F;
+constexpr float kKill = 0.0652F;
+constexpr float kDiffusionU = 0.14F;  // cells^2 per step
+constexpr float kDiffusionV = 0.07F;
 constexpr int kSteps = 8000;
 constexpr int kStepsPerReport = 200;
-constexpr double kSeedDistance = 22.0;  // texels between the drops the reaction grows from
+constexpr double kSeedDistance = 12.0;  // texels between the drops the reaction grows from
+constexpr int kDropRadius = 1;          // texels
 
 // One field with a ghost border, so that inner loops need no wrap.
 class Grid {
@@ -59,8 +62,8 @@ absl::StatusOr<PeriodicField> React(int n, uint64_t seed, const RunContext& cont
   Grid next_u = u;
   Grid next_v = v;
   for (const auto& [x, y] : BlueNoisePoints(n, kSeedDistance, seed)) {
-    for (int dy = -2; dy <= 2; ++dy) {
-      for (int dx = -2; dx <= 2; ++dx) {
+    for (int dy = -kDropRadius; dy <= kDropRadius; ++dy) {
+      for (int dx = -kDropRadius; dx <= kDropRadius; ++dx) {
         const int i = (static_cast<int>(x) + dx + n) % n;
         const int j = (static_cast<int>(y) + dy + n) % n;
         u.row(j)[i] = 0.5F;
@@ -108,7 +111,7 @@ absl::StatusOr<PeriodicField> React(int n, uint64_t seed, const RunContext& cont
 }  // namespace
 
 absl::StatusOr<SurfaceMaps> MakeReactDiffuse(const MapParams& params, const RunContext& context) {
-  constexpr double kOwnScale = 3.2;
+  constexpr double kOwnScale = 2.4;
   constexpr LinearRgb kGroove{0.015F, 0.085F, 0.105F};  // petrol glaze, pooled
   constexpr LinearRgb kFlank{0.42F, 0.10F, 0.035F};     // rust where the glaze breaks
   constexpr LinearRgb kRidge{0.80F, 0.62F, 0.38F};      // ivory
