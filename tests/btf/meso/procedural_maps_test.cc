@@ -209,6 +209,47 @@ TEST(ProceduralMapsTest, FeaturesKeepTheirScaleInTexels) {
   }
 }
 
+// Worms longer than a strip of 16 texels is high are cut off where tiles meet. The longer side of the box
+// around each ridge, in texels, averaged over the area of ridges: 13 here, 20 for the coarser reaction of
+// before.
+TEST(ProceduralMapsTest, RidgesOfReactDiffuseFitStripsOf16Texels) {
+  constexpr double kRidge = 0.6;  // of the range of heights
+  for (const uint64_t seed : {1, 2}) {
+    const SurfaceMaps maps = Make(kKinds[0], seed);
+    const int n = maps.resolution();
+    const auto [low, high] = std::minmax_element(maps.height.begin(), maps.height.end());
+    const float level = static_cast<float>(*low + kRidge * (*high - *low));
+    std::vector<uint8_t> seen(maps.height.size(), 0);
+    double length = 0.0;
+    double area = 0.0;
+    for (int start = 0; start < n * n; ++start) {
+      std::vector<std::array<int, 2>> ridge;  // grows past the border of the map, so that boxes are whole
+      const auto visit = [&](int x, int y) {
+        const int at = (y + 4 * n) % n * n + (x + 4 * n) % n;
+        if (maps.height[at] > level && seen[at] == 0) {
+          seen[at] = 1;
+          ridge.push_back({x, y});
+        }
+      };
+      visit(start % n, start / n);
+      std::array<int, 4> box = {n, n, -n, -n};
+      for (size_t i = 0; i < ridge.size(); ++i) {
+        const auto [x, y] = ridge[i];
+        box = {std::min(box[0], x), std::min(box[1], y), std::max(box[2], x), std::max(box[3], y)};
+        visit(x + 1, y);
+        visit(x - 1, y);
+        visit(x, y + 1);
+        visit(x, y - 1);
+      }
+      const auto texels = static_cast<double>(ridge.size());
+      area += texels;
+      length += texels * (std::max(box[2] - box[0], box[3] - box[1]) + 1) / 2.0;  // 2 cells a texel
+    }
+    ASSERT_GT(area, 0.0);
+    EXPECT_LT(length / area, 18.0) << "seed " << seed;
+  }
+}
+
 TEST(ProceduralMapsTest, StopsWhenAsked) {
   std::stop_source stop;
   stop.request_stop();
