@@ -6,6 +6,10 @@
 #include <string_view>
 #include <utility>
 
+#ifdef __AVX2__
+#include <immintrin.h>
+#endif
+
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_join.h>
 
@@ -33,25 +37,40 @@ constexpr std::array kKnownCodecs = {
     KnownCodec{"dsh-ls", 1, &Make<DshDecoder>},
 };
 
+constexpr int kLanes = 8;
+using Lanes = Eigen::Array<float, kLanes, 1>;
+
+Lanes LanesOf(const uint8_t* codes) {
+#ifdef __AVX2__
+  // Compilers turn the loop below into three times as many instructions.
+  Lanes values;
+  const __m128i bytes = _mm_loadl_epi64(reinterpret_cast<const __m128i*>(codes));
+  _mm256_storeu_ps(values.data(), _mm256_cvtepi32_ps(_mm256_cvtepu8_epi32(bytes)));
+  return values;
+#else
+  return Eigen::Map<const Eigen::Array<uint8_t, kLanes, 1>>(codes).cast<float>();
+#endif
+}
+
 // Sum of w[i] * codes[i]; lanes of their own, so that it vectorises without reordering a sum.
 float Dot(const float* w, const uint8_t* codes, int count) {
-  constexpr int kLanes = 32;
-  std::array<float, kLanes> sums{};
+  std::array<Lanes, 4> sums = {Lanes::Zero(), Lanes::Zero(), Lanes::Zero(), Lanes::Zero()};
+  const auto add = [&](int i, Lanes& sum) { sum += Eigen::Map<const Lanes>(w + i) * LanesOf(codes + i); };
   int i = 0;
+  for (; i + 4 * kLanes <= count; i += 4 * kLanes) {
+    add(i, sums[0]);
+    add(i + kLanes, sums[1]);
+    add(i + 2 * kLanes, sums[2]);
+    add(i + 3 * kLanes, sums[3]);
+  }
   for (; i + kLanes <= count; i += kLanes) {
-    for (int lane = 0; lane < kLanes; ++lane) {
-      sums[lane] += w[i + lane] * static_cast<float>(codes[i + lane]);
-    }
+    add(i, sums[0]);
   }
-  for (int lane = 0; i < count; ++i, ++lane) {
-    sums[lane] += w[i] * static_cast<float>(codes[i]);
+  float rest = 0.0F;
+  for (; i < count; ++i) {
+    rest += w[i] * static_cast<float>(codes[i]);
   }
-  for (int half = kLanes / 2; half > 0; half /= 2) {
-    for (int lane = 0; lane < half; ++lane) {
-      sums[lane] += sums[lane + half];
-    }
-  }
-  return sums[0];
+  return ((sums[0] + sums[1]) + (sums[2] + sums[3])).sum() + rest;
 }
 
 }  // namespace
