@@ -150,7 +150,8 @@ class BlobStore {
   [[nodiscard]] absl::Status Sweep();
   [[nodiscard]] absl::Status CheckSpace(uint64_t needed_bytes) const;
   [[nodiscard]] absl::StatusOr<bool> Exists(const std::string& sha256);
-  // The caller holds upload.mutex.
+  // Of these three the caller holds upload.mutex. Finds the bytes taken before, and hashes them.
+  [[nodiscard]] absl::Status ContinueUpload(UploadSession::Upload& upload);
   [[nodiscard]] absl::Status CommitUpload(UploadSession::Upload& upload);
   [[nodiscard]] absl::Status FinishUpload(UploadSession::Upload& upload);
   void ForgetUpload(const std::string& sha256);

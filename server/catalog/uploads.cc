@@ -17,10 +17,12 @@ constexpr std::string_view kEmptySha256 = "e3b0c44298fc1c149afbf4c8996fb92427ae4
 }  // namespace
 
 struct UploadSession::Upload {
-  std::string sha256;
-  uint64_t size_bytes = 0;
+  explicit Upload(std::string digest) : sha256(std::move(digest)) {}
+  const std::string sha256;
 
   std::mutex mutex;  // guards what follows
+  bool opened = false;
+  uint64_t size_bytes = 0;
   File file;
   Sha256 hash;  // of the first written_bytes
   uint64_t written_bytes = 0;
@@ -91,69 +93,94 @@ absl::StatusOr<UploadProgress> BlobStore::BeginUpload(const std::string& sha256,
 
 absl::StatusOr<UploadSession> BlobStore::OpenUpload(const std::string& sha256) {
   TESSERA_RETURN_IF_ERROR(CheckDigest(sha256, "sha256"));
-  const std::lock_guard lock(uploads_mutex_);
-  if (const auto it = uploads_.find(sha256); it != uploads_.end()) {
-    if (auto upload = it->second.lock()) {
+  for (;;) {
+    std::shared_ptr<UploadSession::Upload> upload;
+    {
+      const std::lock_guard lock(uploads_mutex_);
+      std::erase_if(uploads_, [](const auto& entry) { return entry.second.expired(); });
+      std::weak_ptr<UploadSession::Upload>& entry = uploads_[sha256];
+      upload = entry.lock();
+      if (upload == nullptr) {
+        entry = upload = std::make_shared<UploadSession::Upload>(sha256);
+      }
+    }
+    // Hashing what is there may take seconds: only who wants the same upload waits.
+    absl::Status status;
+    bool usable = false;
+    {
+      const std::lock_guard lock(upload->mutex);
+      if (!upload->forgotten && !upload->opened) {
+        status = ContinueUpload(*upload);
+        upload->opened = status.ok();
+        upload->forgotten = !status.ok();
+      }
+      usable = !upload->forgotten;
+    }
+    if (usable) {
       return UploadSession(*this, std::move(upload));
     }
-    uploads_.erase(it);
+    {
+      const std::lock_guard lock(uploads_mutex_);
+      if (const auto it = uploads_.find(sha256); it != uploads_.end() && it->second.lock() == upload) {
+        uploads_.erase(it);
+      }
+    }
+    TESSERA_RETURN_IF_ERROR(status);
   }
-  auto upload = std::make_shared<UploadSession::Upload>();
-  upload->sha256 = sha256;
+}
+
+absl::Status BlobStore::ContinueUpload(UploadSession::Upload& upload) {
   TESSERA_RETURN_IF_ERROR(connections_.Read([&](Database& db) -> absl::Status {
     TESSERA_ASSIGN_OR_RETURN(Statement blob,
-                             db.Query("SELECT size_bytes FROM blobs WHERE sha256 = ?", sha256));
-    TESSERA_ASSIGN_OR_RETURN(upload->complete, blob.Step());
-    if (upload->complete) {
-      upload->size_bytes = upload->committed_bytes = upload->written_bytes =
-          static_cast<uint64_t>(blob.Int(0));
+                             db.Query("SELECT size_bytes FROM blobs WHERE sha256 = ?", upload.sha256));
+    TESSERA_ASSIGN_OR_RETURN(upload.complete, blob.Step());
+    if (upload.complete) {
+      upload.size_bytes = upload.committed_bytes = upload.written_bytes = static_cast<uint64_t>(blob.Int(0));
       return absl::OkStatus();
     }
     TESSERA_ASSIGN_OR_RETURN(
-        Statement row, db.Query("SELECT size_bytes, committed_bytes FROM uploads WHERE sha256 = ?", sha256));
+        Statement row,
+        db.Query("SELECT size_bytes, committed_bytes FROM uploads WHERE sha256 = ?", upload.sha256));
     TESSERA_ASSIGN_OR_RETURN(const bool known, row.Step());
     if (!known) {
-      return WithReason(absl::NotFoundError(absl::StrCat("no upload of ", sha256, " was begun")), "NOT_FOUND",
-                        sha256);
+      return WithReason(absl::NotFoundError(absl::StrCat("no upload of ", upload.sha256, " was begun")),
+                        "NOT_FOUND", upload.sha256);
     }
-    upload->size_bytes = static_cast<uint64_t>(row.Int(0));
-    upload->committed_bytes = static_cast<uint64_t>(row.Int(1));
+    upload.size_bytes = static_cast<uint64_t>(row.Int(0));
+    upload.committed_bytes = static_cast<uint64_t>(row.Int(1));
     return absl::OkStatus();
   }));
-  if (!upload->complete) {
-    TESSERA_ASSIGN_OR_RETURN(upload->file, File::Open(uploads_folder_ / sha256, O_RDWR | O_CREAT));
-    if (upload->committed_bytes == 0) {
+  if (!upload.complete) {
+    TESSERA_ASSIGN_OR_RETURN(upload.file, File::Open(uploads_folder_ / upload.sha256, O_RDWR | O_CREAT));
+    if (upload.committed_bytes == 0) {
       TESSERA_RETURN_IF_ERROR(SyncFolder(uploads_folder_));
     }
     // Bytes after the committed offset may be anything after a crash.
-    TESSERA_ASSIGN_OR_RETURN(const uint64_t file_bytes, upload->file.Size());
-    upload->committed_bytes = std::min(upload->committed_bytes, file_bytes);
-    TESSERA_RETURN_IF_ERROR(upload->file.Truncate(upload->committed_bytes));
+    TESSERA_ASSIGN_OR_RETURN(const uint64_t file_bytes, upload.file.Size());
+    upload.committed_bytes = std::min(upload.committed_bytes, file_bytes);
+    TESSERA_RETURN_IF_ERROR(upload.file.Truncate(upload.committed_bytes));
     std::string block(kHashBlockBytes, '\0');
-    while (upload->written_bytes < upload->committed_bytes) {
-      const size_t size = std::min<uint64_t>(block.size(), upload->committed_bytes - upload->written_bytes);
+    while (upload.written_bytes < upload.committed_bytes) {
+      const size_t size = std::min<uint64_t>(block.size(), upload.committed_bytes - upload.written_bytes);
       const auto bytes = std::as_writable_bytes(std::span(block)).first(size);
-      TESSERA_RETURN_IF_ERROR(upload->file.ReadAt(upload->written_bytes, bytes).status());
-      upload->hash.Update(bytes);
-      upload->written_bytes += size;
+      TESSERA_RETURN_IF_ERROR(upload.file.ReadAt(upload.written_bytes, bytes).status());
+      upload.hash.Update(bytes);
+      upload.written_bytes += size;
     }
   }
-  uploads_[sha256] = upload;
-  return UploadSession(*this, std::move(upload));
+  return absl::OkStatus();
 }
 
 void BlobStore::ForgetUpload(const std::string& sha256) {
   std::shared_ptr<UploadSession::Upload> upload;
   {
     const std::lock_guard lock(uploads_mutex_);
-    const auto it = uploads_.find(sha256);
-    if (it == uploads_.end()) {
-      return;
+    if (const auto it = uploads_.find(sha256); it != uploads_.end()) {
+      upload = it->second.lock();
     }
-    upload = it->second.lock();
-    uploads_.erase(it);
   }
-  if (upload) {
+  if (upload != nullptr) {  // OpenUpload drops it from the map
+
     const std::lock_guard lock(upload->mutex);
     upload->forgotten = true;
   }

@@ -1,6 +1,10 @@
 #include "server/catalog/blob_store.h"
 
+#include <algorithm>
+#include <atomic>
+#include <chrono>
 #include <fstream>
+#include <thread>
 
 #include <fcntl.h>
 #include <gtest/gtest.h>
@@ -196,6 +200,41 @@ TEST(FileTest, AFullDeviceIsStorageFull) {
   const absl::Status status = file->WriteAt(0, AsBytes("bytes"));
   EXPECT_EQ(status.code(), absl::StatusCode::kResourceExhausted);
   EXPECT_EQ(ReasonOf(status), "STORAGE_FULL");
+}
+
+// A resumed upload is hashed first, which takes long when much of it is there.
+TEST_F(BlobStoreTest, NoUploadWaitsForAnotherToBeHashed) {
+  using std::chrono::steady_clock;
+  constexpr int64_t kLargeBytes = int64_t{256} << 20;  // a sparse file: it takes no space
+  const std::string large(64, 'a');
+  ASSERT_TRUE(
+      catalog_->connections
+          ->Write([&](Database& db) {
+            return db.Run(
+                "INSERT INTO uploads (sha256, size_bytes, committed_bytes, touch_ms) VALUES (?, ?, ?, 0)",
+                large, kLargeBytes + 1, kLargeBytes);
+          })
+          .ok());
+  const std::filesystem::path file = folder_.path() / "uploads" / large;
+  std::ofstream(file).close();
+  std::filesystem::resize_file(file, kLargeBytes);
+  const std::string small = TestBytes(10, 1);
+  ASSERT_TRUE(blobs().BeginUpload(Digest(small), small.size()).ok());
+
+  const auto start = steady_clock::now();
+  std::atomic<bool> hashed = false;
+  std::jthread resumed([&] {
+    const auto session = blobs().OpenUpload(large);
+    EXPECT_TRUE(session.ok()) << session.status();
+    hashed = true;
+  });
+  steady_clock::duration longest{};
+  while (!hashed) {
+    const auto begin = steady_clock::now();
+    ASSERT_TRUE(blobs().OpenUpload(Digest(small)).ok());
+    longest = std::max(longest, steady_clock::now() - begin);
+  }
+  EXPECT_LT(longest * 2, steady_clock::now() - start);
 }
 
 }  // namespace
