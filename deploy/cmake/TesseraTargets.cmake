@@ -16,6 +16,11 @@ function(tessera_compile_options target)
     target_compile_options(${target} PRIVATE -fsanitize=${TESSERA_SANITIZE} -fno-omit-frame-pointer)
     target_link_options(${target} PUBLIC -fsanitize=${TESSERA_SANITIZE})
   endif()
+  if(TESSERA_SANITIZE STREQUAL "thread")
+    # protobuf's headers lay out map fields in another way when they see the sanitizer, and the installed library was
+    # built without it. libstdc++ must go on seeing it.
+    target_compile_options(${target} PRIVATE -U__SANITIZE_THREAD__ -D_GLIBCXX_TSAN=1 -DTESSERA_THREAD_SANITIZER=1)
+  endif()
 endfunction()
 
 # tessera_library(NAME SOURCES a.cc.. [PUBLIC lib..] [PRIVATE lib..])
