@@ -2,8 +2,9 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
-#include <cstring>
+#include <cstdint>
 #include <string>
 #include <vector>
 
@@ -37,15 +38,6 @@ absl::StatusOr<int> BasisSize(const BtfelTable& table, const std::string& name) 
   return static_cast<int>(size);
 }
 
-bool IsIdentity(const CodecTable& basis, int size) {
-  for (int i = 0; i < size * size; ++i) {
-    if (basis.values[i] != (i % (size + 1) == 0 ? 1.0f : 0.0f)) {
-      return false;
-    }
-  }
-  return true;
-}
-
 // How the function of index l(l+1)+m changes under quarter turns t of the direction: the one of even m by a
 // sign, the one of odd m by a sign or, for odd t, into its partner (l, -m).
 enum class TurnClass { kSteady, kFlipped, kSwapped };  // |m| = 0, 2, odd modulo 4
@@ -69,19 +61,26 @@ int PartnerSign(int index) {
   return (std::abs(m) % 4 == 1) == (m > 0) ? 1 : -1;
 }
 
-// Whether the mapped functions turn as the plain ones do: each mixes only functions of its own order m, those
-// of -m alike.
-bool TurnsLikePlain(const CodecTable& basis, int size) {
+enum class BasisForm {
+  kPlain,    // the identity
+  kByOrder,  // each function mixes those of its own order m up to its degree, those of -m alike: they turn as
+             // the plain ones do
+  kGeneral,
+};
+
+BasisForm FormOf(const CodecTable& basis, int size) {
+  bool is_identity = true;
   for (int i = 0; i < size; ++i) {
     for (int j = 0; j < size; ++j) {
       const float value = basis.values[i * size + j];
-      if (OrderOf(i) != OrderOf(j) ? value != 0.0f
-                                   : value != basis.values[PartnerOf(i) * size + PartnerOf(j)]) {
-        return false;
+      is_identity &= value == (i == j ? 1.0f : 0.0f);
+      if (OrderOf(i) != OrderOf(j) || j > i ? value != 0.0f
+                                            : value != basis.values[PartnerOf(i) * size + PartnerOf(j)]) {
+        return BasisForm::kGeneral;
       }
     }
   }
-  return true;
+  return is_identity ? BasisForm::kPlain : BasisForm::kByOrder;
 }
 
 absl::StatusOr<double> LargestPolarAngle(const std::vector<Direction>& directions, const char* what) {
@@ -99,36 +98,60 @@ std::string Literal(double value) {
   return absl::StrFormat("%.9e", value);
 }
 
-// `void name(vec3 d, out float y[size])`: plain real spherical harmonics without the Condon-Shortley sign,
-// index l(l+1)+m, as a straight line of code. The azimuthal factors c_m + i s_m = (x + iy)^m carry sin^m; the
-// rest is the recursion of normalised associated Legendre functions over l.
-void AppendHarmonics(const std::string& name, int size, std::string* out) {
+// `void name(vec3 d, out float y[size])`: real spherical harmonics without the Condon-Shortley sign, index
+// l(l+1)+m, as a straight line of code. The azimuthal factors c_m + i s_m = (x + iy)^m carry sin^m; the rest,
+// q[l], is the recursion of normalised associated Legendre functions over l. With `basis_begin` >= 0 the
+// functions of each order are mapped by the triangular block that lies there (CopyBasis); its entries
+// largely cancel, hence doubles.
+void AppendHarmonics(const std::string& name, int size, int basis_begin, std::string* out) {
   const int orders = static_cast<int>(std::lround(std::sqrt(size)));
-  absl::StrAppend(out, "void ", name, "(vec3 d, out float y[", size,
-                  "]) {\n  float c = 1.0, s = 0.0, t, p0, p1;\n");
+  const bool is_mapped = basis_begin >= 0;
+  const char* const suffix = is_mapped ? "LF" : "";
+  const auto literal = [&](double value) { return absl::StrCat(Literal(value), suffix); };
+  absl::StrAppend(out, "void ", name, "(vec3 d, out float y[", size, "]) {\n  float c = 1.0, s = 0.0, t;\n  ",
+                  is_mapped ? "double" : "float", " q[", orders, "], z = d.z;\n");
+  if (is_mapped) {
+    absl::StrAppend(out, "  vec4 b;\n  double p;\n");
+  }
   double diagonal = std::sqrt(0.25 / kPi);
+  int entry = 0;
   for (int m = 0; m < orders; ++m) {
     if (m > 0) {
       diagonal *= std::sqrt((2.0 * m + 1.0) / (2.0 * m));
       absl::StrAppend(out, "  t = d.x * c - d.y * s; s = d.x * s + d.y * c; c = t;\n");
     }
     for (int l = m; l < orders; ++l) {
+      const std::string q = absl::StrCat("q[", l, "]");
       if (l == m) {
-        absl::StrAppend(out, "  p1 = ", Literal(diagonal * (m > 0 ? std::sqrt(2.0) : 1.0)), ";\n");
+        absl::StrAppend(out, "  ", q, " = ", literal(diagonal * (m > 0 ? std::sqrt(2.0) : 1.0)), ";\n");
       } else if (l == m + 1) {
-        absl::StrAppend(out, "  p0 = p1; p1 = ", Literal(std::sqrt(2.0 * m + 3.0)), " * d.z * p0;\n");
+        absl::StrAppend(out, "  ", q, " = ", literal(std::sqrt(2.0 * m + 3.0)), " * z * q[", m, "];\n");
       } else {
         const double ll = static_cast<double>(l) * l;
         const double below = (l - 1.0) * (l - 1.0);
         const double mm = static_cast<double>(m) * m;
         const double a = std::sqrt((4.0 * ll - 1.0) / (ll - mm));
         const double b = std::sqrt((below - mm) / (4.0 * below - 1.0));
-        absl::StrAppend(out, "  t = ", Literal(a), " * d.z * p1 - ", Literal(a * b),
-                        " * p0; p0 = p1; p1 = t;\n");
+        absl::StrAppend(out, "  ", q, " = ", literal(a), " * z * q[", l - 1, "] - ", literal(a * b), " * q[",
+                        l - 2, "];\n");
       }
-      absl::StrAppend(out, "  y[", l * (l + 1) + m, "] = p1 * c;\n");
+    }
+    for (int l = m; l < orders; ++l) {
+      std::string value = absl::StrCat("q[", l, "]");
+      if (is_mapped) {
+        absl::StrAppend(out, "  p = 0.0LF;\n");
+        for (int below = m; below <= l; ++below, ++entry) {
+          if (entry % 4 == 0) {
+            absl::StrAppend(out, "  b = texelFetch(codec_values, ", basis_begin + entry / 4, ");\n");
+          }
+          absl::StrAppend(out, "  p += double(b.", std::string(1, kComponent[entry % 4]), ") * q[", below,
+                          "];\n");
+        }
+        value = "float(p)";
+      }
+      absl::StrAppend(out, "  y[", l * (l + 1) + m, "] = ", value, " * c;\n");
       if (m > 0) {
-        absl::StrAppend(out, "  y[", l * (l + 1) - m, "] = p1 * s;\n");
+        absl::StrAppend(out, "  y[", l * (l + 1) - m, "] = ", value, " * s;\n");
       }
     }
   }
@@ -156,19 +179,37 @@ void AppendChangeOfBasis(const std::string& y, int size, int first, std::string*
 struct Layout {
   int kl = 0;
   int kv = 0;
-  bool plain_light = true;
-  bool plain_view = true;
-  bool turns_like_plain = true;
+  BasisForm light_form = BasisForm::kPlain;
+  BasisForm view_form = BasisForm::kPlain;
 
+  [[nodiscard]] bool turns_like_plain() const {
+    return light_form != BasisForm::kGeneral && view_form != BasisForm::kGeneral;
+  }
   [[nodiscard]] int row_codes() const { return 3 * kl; }
   [[nodiscard]] int row_texels() const { return (row_codes() + 3) / 4; }
   [[nodiscard]] int light_basis_begin() const { return 1 + kv * 2 * row_texels(); }
-  [[nodiscard]] int view_basis_begin() const {
-    return light_basis_begin() + (plain_light ? 0 : kl * ((kl + 3) / 4));
-  }
-  [[nodiscard]] int num_texels() const { return view_basis_begin() + (plain_view ? 0 : kv * ((kv + 3) / 4)); }
+  [[nodiscard]] int view_basis_begin() const { return light_basis_begin() + BasisTexels(light_form, kl); }
+  [[nodiscard]] int num_texels() const { return view_basis_begin() + BasisTexels(view_form, kv); }
   // Words of one BTFel: each view function's codes start at a texel of four words.
   [[nodiscard]] int btfel_row_texels() const { return (row_codes() + kCodesPerTexel - 1) / kCodesPerTexel; }
+
+ private:
+  static int BasisTexels(BasisForm form, int size) {
+    switch (form) {
+      case BasisForm::kPlain:
+        return 0;
+      case BasisForm::kByOrder: {
+        int entries = 0;
+        for (int n = static_cast<int>(std::lround(std::sqrt(size))); n > 0; --n) {
+          entries += n * (n + 1) / 2;
+        }
+        return (entries + 3) / 4;
+      }
+      case BasisForm::kGeneral:
+        return size * ((size + 3) / 4);
+    }
+    return 0;
+  }
 };
 
 // One weighted sum for BTFels of any turns. With y' = y(turned direction) and x = the partners with their
@@ -180,8 +221,10 @@ std::string Source(const Layout& layout) {
   const auto component = [](int i) { return std::string(1, kComponent[i]); };
   std::string out;
   absl::StrAppend(&out, "uniform usamplerBuffer btfel_words;\nuniform samplerBuffer codec_values;\n");
-  AppendHarmonics("LightHarmonics", layout.kl, &out);
-  AppendHarmonics("ViewHarmonics", layout.kv, &out);
+  AppendHarmonics("LightHarmonics", layout.kl,
+                  layout.light_form == BasisForm::kByOrder ? layout.light_basis_begin() : -1, &out);
+  AppendHarmonics("ViewHarmonics", layout.kv,
+                  layout.view_form == BasisForm::kByOrder ? layout.view_basis_begin() : -1, &out);
   absl::StrAppend(&out, R"(
 vec3 ClampPolar(vec3 d, float cosine, float sine) {
   return d.z < cosine ? vec3(d.xy * (sine / length(d.xy)), cosine) : d;
@@ -196,10 +239,10 @@ vec3 BlendTurned(ivec4 btfels, ivec4 turns, vec4 weights, int count, vec3 light,
                   "  light = ClampPolar(light, q.x, q.y);\n  view = ClampPolar(view, q.z, q.w);\n",
                   "  float yl[", layout.kl, "];\n  float yv[", layout.kv, "];\n",
                   "  LightHarmonics(light, yl);\n  ViewHarmonics(view, yv);\n");
-  if (!layout.plain_light) {
+  if (layout.light_form == BasisForm::kGeneral) {
     AppendChangeOfBasis("yl", layout.kl, layout.light_basis_begin(), &out);
   }
-  if (!layout.plain_view) {
+  if (layout.view_form == BasisForm::kGeneral) {
     AppendChangeOfBasis("yv", layout.kv, layout.view_basis_begin(), &out);
   }
   // The view's functions by class, (steady, flipped, k part, s part), since rows are counted by a loop.
@@ -268,8 +311,9 @@ vec3 BlendTurned(ivec4 btfels, ivec4 turns, vec4 weights, int count, vec3 light,
       absl::StrAppend(&out, "      u = texelFetch(btfel_words, first + ", n / kCodesPerTexel, ");\n");
     }
     const std::string channel = component(n / layout.kl);
+    // By way of int, which vector units convert in one instruction, unlike uint.
     const std::string code =
-        absl::StrCat("float((u.", component((n % kCodesPerTexel) / 4), " >> ", 8 * (n % 4), ") & 255u)");
+        absl::StrCat("float(int((u.", component((n % kCodesPerTexel) / 4), " >> ", 8 * (n % 4), ") & 255u))");
     switch (TurnClassOf(n % layout.kl)) {
       case TurnClass::kSteady:
         absl::StrAppend(&out, "      a0.", channel, " += ", code, " * w[", n, "];\n");
@@ -297,7 +341,7 @@ vec3 BlendTurned(ivec4 btfels, ivec4 turns, vec4 weights, int count, vec3 light,
 
 vec3 BlendBtfels(ivec4 btfels, ivec4 turns, vec4 weights, int count, vec3 light, vec3 view) {
 )");
-  if (layout.turns_like_plain) {
+  if (layout.turns_like_plain()) {
     absl::StrAppend(&out, "  return BlendTurned(btfels, turns, weights, count, light, view);\n}\n");
     return out;
   }
@@ -325,12 +369,23 @@ vec3 BlendBtfels(ivec4 btfels, ivec4 turns, vec4 weights, int count, vec3 light,
   return out;
 }
 
-void CopyBasis(const CodecTable& basis, int size, int first_texel, std::vector<float>* values) {
-  const int stride = (size + 3) / 4 * 4;
-  for (int i = 0; i < size; ++i) {
-    std::copy_n(
-        basis.values.begin() + static_cast<ptrdiff_t>(i) * size, size,
-        values->begin() + 4 * static_cast<ptrdiff_t>(first_texel) + static_cast<ptrdiff_t>(i) * stride);
+void CopyBasis(const CodecTable& basis, int size, BasisForm form, int first_texel,
+               std::vector<float>* values) {
+  float* out = values->data() + 4 * static_cast<ptrdiff_t>(first_texel);
+  if (form == BasisForm::kGeneral) {
+    for (int i = 0; i < size; ++i, out += (size + 3) / 4 * 4) {
+      std::copy_n(basis.values.begin() + static_cast<ptrdiff_t>(i) * size, size, out);
+    }
+  } else if (form == BasisForm::kByOrder) {
+    // Triangles by order m, rows by degree, as AppendHarmonics reads them.
+    const int orders = static_cast<int>(std::lround(std::sqrt(size)));
+    for (int m = 0; m < orders; ++m) {
+      for (int l = m; l < orders; ++l) {
+        for (int below = m; below <= l; ++below) {
+          *out++ = basis.values[(l * (l + 1) + m) * size + below * (below + 1) + m];
+        }
+      }
+    }
   }
 }
 
@@ -352,9 +407,8 @@ absl::StatusOr<CodecGlsl> DshGlsl(const BtfelTable& table) {
   }
   const CodecTable& basis_light = table.tables.at("basis_light");
   const CodecTable& basis_view = table.tables.at("basis_view");
-  layout.plain_light = IsIdentity(basis_light, layout.kl);
-  layout.plain_view = IsIdentity(basis_view, layout.kv);
-  layout.turns_like_plain = TurnsLikePlain(basis_light, layout.kl) && TurnsLikePlain(basis_view, layout.kv);
+  layout.light_form = FormOf(basis_light, layout.kl);
+  layout.view_form = FormOf(basis_view, layout.kv);
 
   CodecGlsl glsl;
   glsl.source = Source(layout);
@@ -376,31 +430,22 @@ absl::StatusOr<CodecGlsl> DshGlsl(const BtfelTable& table) {
       row[4 * layout.row_texels() + n] = table.offset[coefficient(j, n)];
     }
   }
-  if (!layout.plain_light) {
-    CopyBasis(basis_light, layout.kl, layout.light_basis_begin(), &glsl.shared_values);
-  }
-  if (!layout.plain_view) {
-    CopyBasis(basis_view, layout.kv, layout.view_basis_begin(), &glsl.shared_values);
-  }
+  CopyBasis(basis_light, layout.kl, layout.light_form, layout.light_basis_begin(), &glsl.shared_values);
+  CopyBasis(basis_view, layout.kv, layout.view_form, layout.view_basis_begin(), &glsl.shared_values);
 
-  std::vector<uint32_t> order;  // of the codes in a BTFel's words: coefficient by [j][n]
-  for (int j = 0; j < layout.kv; ++j) {
-    for (int n = 0; n < row_codes; ++n) {
-      order.push_back(static_cast<uint32_t>(coefficient(j, n)));
-    }
-  }
+  // The codes of a channel and row lie together on both sides. Byte n % 4 of word n / 4 is its bits from
+  // 8 (n % 4) on: on the little-endian machines that this is for, bytes in order.
+  static_assert(std::endian::native == std::endian::little);
   const int row_words = layout.btfel_row_texels() * 4;
   glsl.words_per_btfel = layout.kv * row_words;
   glsl.btfel_words.resize(table.size() * glsl.words_per_btfel);
+  auto* bytes = reinterpret_cast<uint8_t*>(glsl.btfel_words.data());
   for (size_t btfel = 0; btfel < table.size(); ++btfel) {
-    const uint8_t* codes = table.codes.data() + btfel * k;
-    uint32_t* words = glsl.btfel_words.data() + btfel * glsl.words_per_btfel;
-    for (int j = 0; j < layout.kv; ++j) {
-      const uint32_t* row_order = order.data() + static_cast<ptrdiff_t>(j) * row_codes;
-      for (int n = 0; n < row_codes; ++n) {
-        words[n / 4] |= static_cast<uint32_t>(codes[row_order[n]]) << (8 * (n % 4));
+    const uint8_t* const codes = table.codes.data() + btfel * k;
+    for (int j = 0; j < layout.kv; ++j, bytes += 4 * static_cast<ptrdiff_t>(row_words)) {
+      for (int channel = 0; channel < 3; ++channel) {
+        std::copy_n(codes + coefficient(j, channel * layout.kl), layout.kl, bytes + channel * layout.kl);
       }
-      words += row_words;
     }
   }
   return glsl;

@@ -161,13 +161,17 @@ TEST_P(DshGlslTest, BlendsWhatTheDecoderBlends) {
 INSTANTIATE_TEST_SUITE_P(Sizes, DshGlslTest,
                          ::testing::Values(Size{25, 25}, Size{1, 1}, Size{4, 1}, Size{9, 16}, Size{36, 4},
                                            Size{49, 49}, Size{25, 9, BasisKind::kGeneral},
-                                           Size{16, 25, BasisKind::kByOrder}),
+                                           Size{16, 25, BasisKind::kByOrder},
+                                           Size{25, 25, BasisKind::kOrthonormal},
+                                           Size{49, 49, BasisKind::kOrthonormal},
+                                           Size{9, 25, BasisKind::kOrthonormal}),
                          [](const auto& info) {
                            return "kl" + std::to_string(info.param.kl) + "kv" +
                                   std::to_string(info.param.kv) +
                                   (info.param.basis == BasisKind::kIdentity  ? ""
                                    : info.param.basis == BasisKind::kByOrder ? "ByOrder"
-                                                                             : "General");
+                                   : info.param.basis == BasisKind::kGeneral ? "General"
+                                                                             : "Orthonormal");
                          });
 
 TEST(DshGlsl, RefusesTablesThatDoNotFit) {

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "btf/base/rng.h"
+#include "btf/codec/dsh/dsh_basis.h"
 #include "btf/image/image.h"
 #include "btf/render/reference.h"
 #include "btf/wang/arrangement.h"
@@ -23,7 +24,7 @@ inline int Degree(int index) {
 
 // Bases of a codec: the identity; functions that mix degrees but keep their order m, as orthonormalising over
 // the hemisphere does; anything invertible.
-enum class BasisKind { kIdentity, kByOrder, kGeneral };
+enum class BasisKind { kIdentity, kByOrder, kGeneral, kOrthonormal };
 
 inline CodecTable Basis(int size, BasisKind kind) {
   CodecTable table{{size, size}, std::vector<float>(static_cast<size_t>(size) * size)};
@@ -41,6 +42,13 @@ inline CodecTable Basis(int size, BasisKind kind) {
   return table;
 }
 
+// The basis of codec "dsh".
+inline CodecTable OrthonormalBasis(int size, DshArgument argument, double max_theta_deg) {
+  const Eigen::MatrixXf basis =
+      OrthonormalDshBasis(size, argument, RadFromDeg(max_theta_deg)).transpose().cast<float>();
+  return {{size, size}, std::vector<float>(basis.data(), basis.data() + basis.size())};
+}
+
 // Smooth reflectance between about 0 and 1 that differs from BTFel to BTFel and with every direction.
 inline BtfelTable RandomBtfels(int count, int kl, int kv, uint64_t seed,
                                BasisKind basis = BasisKind::kIdentity) {
@@ -51,6 +59,11 @@ inline BtfelTable RandomBtfels(int count, int kl, int kv, uint64_t seed,
   table.parameters = {{"kl", kl}, {"kv", kv}};
   table.tables["basis_light"] = Basis(kl, basis);
   table.tables["basis_view"] = Basis(kv, basis);
+  if (basis == BasisKind::kOrthonormal) {
+    table.codec_id = "dsh";
+    table.tables["basis_light"] = OrthonormalBasis(kl, DshArgument::kLight, 75.0);
+    table.tables["basis_view"] = OrthonormalBasis(kv, DshArgument::kView, 70.0);
+  }
   table.lights = {{0.0, 0.0}, {RadFromDeg(75.0), 0.0}};
   table.views = {{0.0, 0.0}, {RadFromDeg(70.0), 0.0}};
   for (int k = 0; k < table.num_coefficients; ++k) {
