@@ -273,8 +273,11 @@ absl::Status AddCoefficients(const BtfelTable& table, const std::vector<int64_t>
                                                    " codes do not fill shape [", absl::StrJoin(shape, ", "),
                                                    "]"));
   }
-  container.sections.push_back(
-      MakeSection<uint8_t>("coefficients", std::move(shape), std::span<const uint8_t>(table.codes)));
+  Section section;
+  section.name = "coefficients";
+  section.shape = std::move(shape);
+  section.codes = &table.codes;
+  container.sections.push_back(std::move(section));
   return absl::OkStatus();
 }
 

@@ -28,7 +28,8 @@ namespace tessera {
 // the tables does not fit the codec; UNIMPLEMENTED naming a codec or version that this library does not know.
 [[nodiscard]] absl::StatusOr<BtfelTable> ReadSharedTables(const Container& container);
 
-// Section `coefficients` u8 [extents..][k]. Errors: INVALID_ARGUMENT when the codes do not fill the extents.
+// Section `coefficients` u8 [extents..][k]; its bytes stay in `table`. Errors: INVALID_ARGUMENT when the
+// codes do not fill the extents.
 [[nodiscard]] absl::Status AddCoefficients(const BtfelTable& table, const std::vector<int64_t>& extents,
                                            Container& container);
 // Sets table.codes from section `coefficients` and returns its `rank` leading extents, each >= 1.

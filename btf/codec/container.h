@@ -25,6 +25,8 @@
 
 namespace tessera {
 
+class CodeBuffer;
+
 inline constexpr uint32_t kContainerVersion = 1;
 inline constexpr uint64_t kMaxHeaderBytes = uint64_t{16} << 20;
 inline constexpr int kMaxSections = 1024;
@@ -69,6 +71,9 @@ struct Section {
   DType dtype = DType::kU8;
   std::vector<int64_t> shape;  // at most 8 extents, each >= 0; none means one element
   std::string bytes;           // product of shape * DTypeSize(dtype)
+  // In a container that is about to be written, the bytes may be a table's codes in place of `bytes`: not
+  // copied, not owned, stored as they are.
+  const CodeBuffer* codes = nullptr;
   // How it is stored. Asking for zstd is a wish: a section that would expand beyond the limits above, or
   // would not shrink, is stored as it is.
   Encoding encoding = Encoding::kNone;
@@ -85,10 +90,33 @@ struct Container {
   [[nodiscard]] const Section* Find(std::string_view name) const;
 };
 
-// Same container, same bytes, on every machine (one zstd version assumed where zstd is asked for).
-// Errors: INVALID_ARGUMENT naming the section whose name, shape or size is illegal, or the header when it is
-// not UTF-8 or too large.
-[[nodiscard]] absl::StatusOr<std::string> SerializeContainer(const Container& container);
+// A container file that is put together as it is read, so that writing and sending it takes no memory beyond
+// the container's own. What its sections do not own must stay alive and unchanged. Thread-safe.
+class ContainerFile {
+ public:
+  // Same container, same bytes, on every machine (one zstd version assumed where zstd is asked for). Reads
+  // every section once, for its checksum. Errors: INVALID_ARGUMENT naming the section whose name, shape or
+  // size is illegal, or the header when it is not UTF-8 or too large; CodeBuffer::Read's.
+  [[nodiscard]] static absl::StatusOr<ContainerFile> Create(Container container);
+
+  [[nodiscard]] uint64_t size_bytes() const { return size_bytes_; }
+  // Fills `bytes` with those of the file from `offset` on; they lie within its size. Errors:
+  // CodeBuffer::Read's.
+  [[nodiscard]] absl::Status Read(uint64_t offset, std::span<std::byte> bytes) const;
+  // The whole file.
+  [[nodiscard]] absl::StatusOr<std::string> ReadAll() const;
+
+ private:
+  ContainerFile() = default;
+
+  std::string head_;               // up to where the first section may lie
+  std::vector<Section> sections_;  // as they are stored
+  std::vector<uint64_t> offsets_;  // [section]
+  uint64_t size_bytes_ = 0;
+};
+
+// ContainerFile::ReadAll. Errors: those of ContainerFile.
+[[nodiscard]] absl::StatusOr<std::string> SerializeContainer(Container container);
 
 // Safe on hostile bytes: every size is checked before it is used or allocated.
 // Errors: INVALID_ARGUMENT (not a container, a header that breaks a rule), DATA_LOSS (truncated, checksum),

@@ -15,9 +15,11 @@ constexpr int64_t kMaxHeaderValues = int64_t{1} << 20;
 
 }  // namespace
 
-uint32_t SectionCrc32(std::string_view bytes) {
-  return static_cast<uint32_t>(
-      crc32_z(crc32_z(0, nullptr, 0), reinterpret_cast<const Bytef*>(bytes.data()), bytes.size()));
+uint32_t SectionCrc32(std::string_view bytes, uint32_t before) {
+  // Asked about no bytes at all, zlib answers with its initial value.
+  return bytes.empty() ? before
+                       : static_cast<uint32_t>(
+                             crc32_z(before, reinterpret_cast<const Bytef*>(bytes.data()), bytes.size()));
 }
 
 bool IsSectionName(std::string_view name) {

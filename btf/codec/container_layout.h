@@ -30,8 +30,8 @@ inline constexpr std::array<std::pair<DType, std::string_view>, 5> kDTypeNames =
   return (offset + kSectionAlignment - 1) / kSectionAlignment * kSectionAlignment;
 }
 
-// zlib's CRC-32 of a section's stored bytes.
-[[nodiscard]] uint32_t SectionCrc32(std::string_view bytes);
+// zlib's CRC-32 of a section's stored bytes; piece by piece, `before` being that of the pieces before.
+[[nodiscard]] uint32_t SectionCrc32(std::string_view bytes, uint32_t before = 0);
 
 // [a-z0-9_.]{1,64}
 [[nodiscard]] bool IsSectionName(std::string_view name);

@@ -16,7 +16,7 @@ constexpr char kProducer[] = "tessera";
 
 }  // namespace
 
-absl::StatusOr<std::string> SerializeMaterial(const Material& material) {
+absl::StatusOr<ContainerFile> MaterialFile(const Material& material) {
   Container container;
   container.kind = kMaterialKind;
   container.header = material.other_keys;
@@ -26,7 +26,12 @@ absl::StatusOr<std::string> SerializeMaterial(const Material& material) {
   AddProvenance(material.provenance, container);
   TESSERA_RETURN_IF_ERROR(AddSharedTables(material.btfels, container));
   TESSERA_RETURN_IF_ERROR(AddCoefficients(material.btfels, {material.height, material.width}, container));
-  return SerializeContainer(container);
+  return ContainerFile::Create(std::move(container));
+}
+
+absl::StatusOr<std::string> SerializeMaterial(const Material& material) {
+  TESSERA_ASSIGN_OR_RETURN(const ContainerFile file, MaterialFile(material));
+  return file.ReadAll();
 }
 
 absl::StatusOr<Material> ParseMaterial(std::span<const std::byte> bytes) {

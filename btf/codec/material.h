@@ -10,6 +10,7 @@
 #include <absl/status/statusor.h>
 
 #include "btf/codec/btfel_table.h"
+#include "btf/codec/container.h"
 
 namespace tessera {
 
@@ -26,7 +27,10 @@ struct Material {
   nlohmann::json other_keys = nlohmann::json::object();
 };
 
-// Bytes of the container. Errors: INVALID_ARGUMENT when shapes disagree.
+// The container, its codes not copied: `material` must stay alive and unchanged. Errors: INVALID_ARGUMENT
+// when shapes disagree, ContainerFile's.
+[[nodiscard]] absl::StatusOr<ContainerFile> MaterialFile(const Material& material);
+// All bytes of it.
 [[nodiscard]] absl::StatusOr<std::string> SerializeMaterial(const Material& material);
 // Errors: INVALID_ARGUMENT or DATA_LOSS naming the section and the limit; safe on hostile bytes.
 [[nodiscard]] absl::StatusOr<Material> ParseMaterial(std::span<const std::byte> bytes);

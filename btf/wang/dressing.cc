@@ -90,7 +90,7 @@ absl::StatusOr<std::string> SerializeDressing(const Dressing& dressing) {
       MakeSection<uint32_t>("tile", {num_quads}, std::span<const uint32_t>(dressing.tile)));
   container.sections.push_back(
       MakeSection<uint8_t>("turns", {num_quads}, std::span<const uint8_t>(dressing.turns)));
-  return SerializeContainer(container);
+  return SerializeContainer(std::move(container));
 }
 
 absl::StatusOr<Dressing> ParseDressing(std::span<const std::byte> bytes) {

@@ -97,7 +97,7 @@ absl::StatusOr<std::string> SerializeTileSet(const TileSet& tile_set) {
                                                      std::span<const uint32_t>(tile_set.tile_index)));
   TESSERA_RETURN_IF_ERROR(AddSharedTables(tile_set.btfels, container));
   TESSERA_RETURN_IF_ERROR(AddCoefficientsByEnergy(tile_set.btfels, container));
-  return SerializeContainer(container);
+  return SerializeContainer(std::move(container));
 }
 
 absl::StatusOr<TileSet> ParseTileSet(std::span<const std::byte> bytes) {

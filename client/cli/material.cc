@@ -138,18 +138,16 @@ absl::Status ImportHere(Session& session, Client& client, const ImportFlags& fla
       .kl = static_cast<int>(flags.codec.kl),
       .kv = static_cast<int>(flags.codec.kv),
       .cls_energy = flags.codec.cls_energy == "sphere" ? ClsEnergy::kSphere : ClsEnergy::kHemisphere,
-      .memory_budget_bytes = options.memory_budget_bytes};
+      .memory_budget_bytes = options.memory_budget_bytes,
+      .spill_folder = options.spill_folder};
   TESSERA_RETURN_IF_ERROR(CheckNameIsFree(client, name, flags.replace, context));
 
-  std::string bytes;
-  {
-    TESSERA_ASSIGN_OR_RETURN(const std::unique_ptr<BtfSource> source,
-                             ImportBtf(flags.path, options, context));
-    TESSERA_ASSIGN_OR_RETURN(Material material, codec->Encode(*source, params, context));
-    TESSERA_RETURN_IF_ERROR(RecordDiagnosis(*source, context, material));
-    TESSERA_ASSIGN_OR_RETURN(bytes, SerializeMaterial(material));
-  }
-  TESSERA_ASSIGN_OR_RETURN(const v1::Blob blob, client.UploadBytes(std::as_bytes(std::span(bytes)), context));
+  TESSERA_ASSIGN_OR_RETURN(std::unique_ptr<BtfSource> source, ImportBtf(flags.path, options, context));
+  TESSERA_ASSIGN_OR_RETURN(Material material, codec->Encode(*source, params, context));
+  TESSERA_RETURN_IF_ERROR(RecordDiagnosis(*source, context, material));
+  source.reset();
+  TESSERA_ASSIGN_OR_RETURN(const ContainerFile file, MaterialFile(material));
+  TESSERA_ASSIGN_OR_RETURN(const v1::Blob blob, client.UploadContainer(file, context));
   v1::CreateMaterialRequest request;
   request.set_name(name);
   request.set_blob_sha256(blob.sha256());
@@ -327,9 +325,10 @@ void AddImport(CLI::App& noun, Session& session) {
   command->add_option("--source", flags->provenance.source, "Where the BTF comes from");
   command->add_option("--licence", flags->provenance.licence, "What may be done with it");
   command->add_option("--citation", flags->provenance.citation, "What to cite");
-  command->add_option("--memory-budget", flags->memory_budget_mib, "Bound on memory for samples, MiB")
+  command
+      ->add_option("--memory-budget", flags->memory_budget_mib, "Bound on memory for samples and codes, MiB")
       ->capture_default_str();
-  command->add_option("--spill", flags->spill_folder, "Folder for the temporary file [the system's]");
+  command->add_option("--spill", flags->spill_folder, "Folder for temporary files [the system's]");
   command->add_flag("--on-server", flags->on_server, "Send the archive and let the server import it");
   command->add_flag("--replace", flags->replace, "Take a name that exists");
   command->callback(

@@ -131,6 +131,9 @@ class Client {
   // one of another process; a blob that the server holds is not sent again.
   [[nodiscard]] absl::StatusOr<v1::Blob> UploadBytes(std::span<const std::byte> bytes,
                                                      const RunContext& context = {});
+  // Takes no memory beyond what `file` refers to.
+  [[nodiscard]] absl::StatusOr<v1::Blob> UploadContainer(const ContainerFile& file,
+                                                         const RunContext& context = {});
   [[nodiscard]] absl::StatusOr<v1::Blob> UploadFile(const std::filesystem::path& path,
                                                     const RunContext& context = {});
   // The whole blob in memory, digest checked.

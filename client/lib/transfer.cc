@@ -89,6 +89,24 @@ absl::Status Upload(v1::Blobs::Stub& blobs, const v1::Blob& blob, const ReadAt& 
   }
 }
 
+// Reads the bytes once for their digest and once more to send them.
+absl::StatusOr<v1::Blob> UploadFrom(v1::Blobs::Stub& blobs, uint64_t size, const ReadAt& read_at,
+                                    const RetryPolicy& retry, const RunContext& context) {
+  Sha256 digest;
+  std::string chunk;
+  for (uint64_t offset = 0; offset < size; offset += chunk.size()) {
+    TESSERA_RETURN_IF_ERROR(context.CheckStop());
+    TESSERA_RETURN_IF_ERROR(read_at(offset, std::min(kChunkBytes, size - offset), chunk));
+    digest.Update(std::as_bytes(std::span(chunk)));
+    context.Report("checking", offset + chunk.size(), size, "bytes");
+  }
+  v1::Blob blob;
+  blob.set_sha256(digest.HexDigest());
+  blob.set_size_bytes(size);
+  TESSERA_RETURN_IF_ERROR(Upload(blobs, blob, read_at, retry, context));
+  return blob;
+}
+
 // May take the bytes away: what is left in `chunk` is overwritten.
 using Sink = std::function<absl::Status(std::string& chunk)>;
 
@@ -248,41 +266,35 @@ std::filesystem::path DefaultCacheFolder() {
 }
 
 absl::StatusOr<v1::Blob> Client::UploadBytes(std::span<const std::byte> bytes, const RunContext& context) {
-  v1::Blob blob;
-  blob.set_sha256(Sha256Hex(bytes));
-  blob.set_size_bytes(bytes.size());
-  TESSERA_RETURN_IF_ERROR(Upload(
-      *stubs_->blobs, blob,
+  return UploadFrom(
+      *stubs_->blobs, bytes.size(),
       [bytes](uint64_t offset, uint64_t count, std::string& chunk) {
         const auto part = bytes.subspan(offset, count);
         chunk.assign(reinterpret_cast<const char*>(part.data()), part.size());
         return absl::OkStatus();
       },
-      options_.retry, context));
-  return blob;
+      options_.retry, context);
+}
+
+absl::StatusOr<v1::Blob> Client::UploadContainer(const ContainerFile& file, const RunContext& context) {
+  return UploadFrom(
+      *stubs_->blobs, file.size_bytes(),
+      [&file](uint64_t offset, uint64_t count, std::string& chunk) {
+        chunk.resize(count);
+        return file.Read(offset, std::as_writable_bytes(std::span(chunk)));
+      },
+      options_.retry, context);
 }
 
 absl::StatusOr<v1::Blob> Client::UploadFile(const std::filesystem::path& path, const RunContext& context) {
   const InputFile file(path);
   TESSERA_ASSIGN_OR_RETURN(const uint64_t size, file.Size());
-  Sha256 digest;
-  std::string chunk;
-  for (uint64_t offset = 0; offset < size; offset += chunk.size()) {
-    TESSERA_RETURN_IF_ERROR(context.CheckStop());
-    TESSERA_RETURN_IF_ERROR(file.ReadAt(offset, std::min(kChunkBytes, size - offset), chunk));
-    digest.Update(BytesOf(chunk));
-    context.Report("checking", offset + chunk.size(), size, "bytes");
-  }
-  v1::Blob blob;
-  blob.set_sha256(digest.HexDigest());
-  blob.set_size_bytes(size);
-  TESSERA_RETURN_IF_ERROR(Upload(
-      *stubs_->blobs, blob,
-      [&file](uint64_t offset, uint64_t count, std::string& bytes) {
-        return file.ReadAt(offset, count, bytes);
+  return UploadFrom(
+      *stubs_->blobs, size,
+      [&file](uint64_t offset, uint64_t count, std::string& chunk) {
+        return file.ReadAt(offset, count, chunk);
       },
-      options_.retry, context));
-  return blob;
+      options_.retry, context);
 }
 
 absl::StatusOr<std::string> Client::ReadBlob(const v1::Blob& blob, const RunContext& context) {

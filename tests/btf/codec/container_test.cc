@@ -1,5 +1,6 @@
 #include "btf/codec/container.h"
 
+#include <algorithm>
 #include <cstring>
 #include <string>
 #include <string_view>
@@ -7,6 +8,8 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+
+#include "btf/codec/code_buffer.h"
 
 namespace tessera {
 namespace {
@@ -57,6 +60,33 @@ absl::Status StatusOfEntry(const std::string& entry) {
   // Offsets in the entries below count from the body: every header here fits in 512 bytes.
   header.resize(512 - 16, ' ');
   return ParseContainer(Bytes(WithHeader(header, std::string(64, '\0')))).status();
+}
+
+TEST(ContainerFileTest, AnyPieceIsThatOfTheWhole) {
+  CodeBuffer codes = *CodeBuffer::Create(3000, /*memory_limit_bytes=*/0);
+  for (size_t i = 0; i < codes.size(); ++i) {
+    codes[i] = static_cast<uint8_t>(i * 7);
+  }
+  Container copied = Example();
+  copied.sections.push_back(MakeSection<uint8_t>("coefficients", {30, 100}, std::span<const uint8_t>(codes)));
+  Container borrowed = Example();
+  borrowed.sections.push_back({.name = "coefficients", .shape = {30, 100}, .codes = &codes});
+  for (Container* container : {&copied, &borrowed}) {  // and something behind it
+    container->sections.push_back(
+        MakeSection<uint8_t>("last", {5}, std::span<const uint8_t>(codes).first(5)));
+  }
+  const std::string whole = Serialized(copied);
+  const auto file = ContainerFile::Create(borrowed);
+  ASSERT_TRUE(file.ok()) << file.status();
+  ASSERT_EQ(file->size_bytes(), whole.size());
+  EXPECT_EQ(*file->ReadAll(), whole);
+  for (const size_t step : {1, 7, 64, 1000}) {
+    for (size_t offset = 0; offset < whole.size(); offset += step) {
+      std::string piece(std::min(step, whole.size() - offset), '?');
+      ASSERT_TRUE(file->Read(offset, std::as_writable_bytes(std::span(piece))).ok());
+      ASSERT_EQ(piece, whole.substr(offset, step)) << offset << " step " << step;
+    }
+  }
 }
 
 TEST(ContainerTest, RoundTripKeepsEverything) {
