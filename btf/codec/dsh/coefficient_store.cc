@@ -1,27 +1,13 @@
 #include "btf/codec/dsh/coefficient_store.h"
 
-#include <algorithm>
-#include <cerrno>
 #include <cstdlib>
-#include <cstring>
-#include <filesystem>
-#include <string>
-#include <system_error>
 
-#include <absl/strings/str_cat.h>
 #include <sys/mman.h>
-#include <unistd.h>
+
+#include "btf/base/status_macros.h"
 
 namespace tessera {
 namespace {
-
-absl::Status FileError(const char* what) {
-  const int error = errno;
-  const std::string message =
-      absl::StrCat("temporary file of coefficients: ", what, ": ", std::strerror(error));
-  return error == ENOSPC || error == EDQUOT ? absl::ResourceExhaustedError(message)
-                                            : absl::UnavailableError(message);
-}
 
 // In huge pages where the system grants them: faulting in 4 KiB at a time costs more than the values'
 // computation.
@@ -37,37 +23,16 @@ std::unique_ptr<float[], FreeDeleter> Allocate(uint64_t count) {
 
 }  // namespace
 
-absl::StatusOr<std::unique_ptr<CoefficientStore>> CoefficientStore::Create(uint64_t num_values,
-                                                                           uint64_t budget_bytes) {
+absl::StatusOr<std::unique_ptr<CoefficientStore>> CoefficientStore::Create(
+    uint64_t num_values, uint64_t budget_bytes, const std::filesystem::path& spill_folder) {
   std::unique_ptr<CoefficientStore> store(new CoefficientStore());
   const uint64_t bytes = num_values * sizeof(float);
   if (bytes <= budget_bytes) {
     store->Resize(num_values);
     return store;
   }
-  std::error_code error;
-  const std::filesystem::path folder = std::filesystem::temp_directory_path(error);
-  if (error) {
-    return absl::UnavailableError(absl::StrCat("temporary folder: ", error.message()));
-  }
-  const std::filesystem::space_info space = std::filesystem::space(folder, error);
-  if (!error && space.available < bytes) {
-    return absl::ResourceExhaustedError(absl::StrCat("temporary folder: ", bytes, " bytes of coefficients, ",
-                                                     space.available, " bytes are free"));
-  }
-  std::string name = (folder / "tessera-coefficients-XXXXXX").string();
-  store->file_ = mkstemp(name.data());
-  if (store->file_ < 0) {
-    return FileError("create");
-  }
-  unlink(name.c_str());
+  TESSERA_ASSIGN_OR_RETURN(store->file_, SpillFile::Create(spill_folder, bytes));
   return store;
-}
-
-CoefficientStore::~CoefficientStore() {
-  if (file_ >= 0) {
-    close(file_);
-  }
 }
 
 std::span<float> CoefficientStore::Resize(uint64_t count) {
@@ -91,22 +56,7 @@ absl::Status CoefficientStore::EndWrite() {
   if (!is_spilled()) {
     return absl::OkStatus();
   }
-  const char* bytes = reinterpret_cast<const char*>(values_.get());
-  size_t left = block_size_ * sizeof(float);
-  off_t offset = static_cast<off_t>(block_begin_ * sizeof(float));
-  while (left > 0) {
-    const ssize_t written = pwrite(file_, bytes, left, offset);
-    if (written < 0 && errno == EINTR) {
-      continue;
-    }
-    if (written <= 0) {
-      return FileError("write");
-    }
-    bytes += written;
-    offset += written;
-    left -= static_cast<size_t>(written);
-  }
-  return absl::OkStatus();
+  return file_->Write(block_begin_ * sizeof(float), std::as_bytes(std::span(values_.get(), block_size_)));
 }
 
 absl::StatusOr<std::span<const float>> CoefficientStore::Read(uint64_t begin, uint64_t count) {
@@ -114,21 +64,7 @@ absl::StatusOr<std::span<const float>> CoefficientStore::Read(uint64_t begin, ui
     return std::span<const float>(values_.get() + begin, count);
   }
   const std::span<float> values = Resize(count);
-  char* bytes = reinterpret_cast<char*>(values.data());
-  size_t left = count * sizeof(float);
-  off_t offset = static_cast<off_t>(begin * sizeof(float));
-  while (left > 0) {
-    const ssize_t got = pread(file_, bytes, left, offset);
-    if (got < 0 && errno == EINTR) {
-      continue;
-    }
-    if (got <= 0) {
-      return FileError(got == 0 ? "read beyond its end" : "read");
-    }
-    bytes += got;
-    offset += got;
-    left -= static_cast<size_t>(got);
-  }
+  TESSERA_RETURN_IF_ERROR(file_->Read(begin * sizeof(float), std::as_writable_bytes(values)));
   return std::span<const float>(values);
 }
 

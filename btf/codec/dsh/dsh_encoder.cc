@@ -189,8 +189,9 @@ absl::StatusOr<Material> EncodeWith(const Model& model, BtfSource& source, const
 
   // Three quarters of the budget for coefficients; what they leave is for rows of samples.
   const uint64_t coefficient_budget = params.memory_budget_bytes / 4 * 3;
-  TESSERA_ASSIGN_OR_RETURN(const std::unique_ptr<CoefficientStore> store,
-                           CoefficientStore::Create(values_per_row * info.height, coefficient_budget));
+  TESSERA_ASSIGN_OR_RETURN(
+      const std::unique_ptr<CoefficientStore> store,
+      CoefficientStore::Create(values_per_row * info.height, coefficient_budget, params.spill_folder));
   const uint64_t block_bytes =
       store->is_spilled() ? sample_row_bytes + coefficient_row_bytes : sample_row_bytes;
   const uint64_t held_bytes = store->is_spilled() ? 0 : coefficient_row_bytes * info.height;
