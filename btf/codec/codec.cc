@@ -3,6 +3,7 @@
 #include <array>
 #include <span>
 
+#include "btf/codec/dfmf/dfmf_codec.h"
 #include "btf/codec/dsh/dsh_codec.h"
 #include "btf/codec/dsh/dsh_encoder.h"
 
@@ -13,10 +14,12 @@ std::span<const Codec* const> Codecs() {
   static const DshCodec dsh_cls("dsh-cls", &EncodeDshCls);
   static const DshCodec dsh("dsh", &EncodeDsh);
   static const DshCodec dsh_ls("dsh-ls", &EncodeDshLs);
+  static const DfmfCodec dfmf;
   static const std::array codecs = {
       static_cast<const Codec*>(&dsh_cls),
       static_cast<const Codec*>(&dsh),
       static_cast<const Codec*>(&dsh_ls),
+      static_cast<const Codec*>(&dfmf),
   };
   return codecs;
 }

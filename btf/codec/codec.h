@@ -24,10 +24,19 @@ namespace tessera {
 // f^2.
 enum class ClsEnergy { kHemisphere, kSphere };
 
+// Coefficients a texel of "dfmf" where nothing else is asked.
+inline constexpr int kDefaultDfmfRank = 48;
+
+// Codecs ignore what is not theirs.
 struct EncodeParams {
   int kl = 25;  // light coefficients, one of 1, 4, 9, 16, 25, 36, 49
   int kv = 25;  // view coefficients, likewise
   ClsEnergy cls_energy = ClsEnergy::kHemisphere;
+  // Of "dfmf", at most one of the three; none: rank kDefaultDfmfRank.
+  int rank = 0;  // coefficients a texel, 0 for none; fewer where more would add nothing
+  double max_error =
+      0.0;  // RMSE of decoded linear RGB over all samples, absolute, 0 for none: smallest that meets it
+  uint64_t max_bytes = 0;  // of the whole container, 0 for none: most accurate that fits
   uint64_t memory_budget_bytes = uint64_t{512} << 20;
   std::filesystem::path spill_folder;  // for what exceeds the budget; empty: the system's temporary folder
 };
@@ -58,13 +67,15 @@ struct Embedding {
 // GLSL of a codec. Declares
 //   vec3 BlendBtfels(ivec4 btfels, ivec4 turns, vec4 weights, int count, vec3 light, vec3 view)
 // the weighted sum of the first `count` BTFels' values, unclamped, each turned by its quarter turns, under
-// one pair of directions in the surface's frame, with the semantics of Decoder::Evaluate; it reads the two
+// one pair of directions in the surface's frame, with the semantics of Decoder::Evaluate; it reads the
 // buffer textures below through texelFetch.
 struct CodecGlsl {
   std::string source;
   int words_per_btfel = 0;
   std::vector<uint32_t> btfel_words;  // usamplerBuffer `btfel_words`, format RGBA32UI, padded to whole texels
   std::vector<float> shared_values;   // samplerBuffer `codec_values`, format RGBA32F, padded likewise
+  std::vector<uint32_t>
+      shared_words;  // usamplerBuffer `codec_words`, format RGBA32UI; not declared when empty
 };
 
 class Codec {

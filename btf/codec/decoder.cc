@@ -14,6 +14,7 @@
 #include <absl/strings/str_join.h>
 
 #include "btf/base/status_macros.h"
+#include "btf/codec/dfmf/dfmf_decoder.h"
 #include "btf/codec/dsh/dsh_decoder.h"
 
 namespace tessera {
@@ -35,6 +36,7 @@ constexpr std::array kKnownCodecs = {
     KnownCodec{"dsh-cls", 1, &Make<DshDecoder>},
     KnownCodec{"dsh", 1, &Make<DshDecoder>},
     KnownCodec{"dsh-ls", 1, &Make<DshDecoder>},
+    KnownCodec{"dfmf", kDfmfVersion, &Make<DfmfDecoder>},
 };
 
 constexpr int kLanes = 8;

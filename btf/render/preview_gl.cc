@@ -80,6 +80,7 @@ class PreviewDrawing {
         tile_index_(gl_),
         btfel_words_(gl_),
         codec_values_(gl_),
+        codec_words_(gl_),
         vertices_(gl_),
         indices_(gl_),
         vertex_array_(gl_),
@@ -109,6 +110,7 @@ class PreviewDrawing {
   BufferTexture tile_index_;
   BufferTexture btfel_words_;
   BufferTexture codec_values_;
+  BufferTexture codec_words_;
   GlBuffer vertices_;
   GlBuffer indices_;
   GlVertexArray vertex_array_;
@@ -197,6 +199,10 @@ absl::Status PreviewDrawing::Prepare(const DressedSurface& surface, const CodecG
       btfel_words_.Fill(std::span<const uint32_t>(codec.btfel_words), GL_RGBA32UI, 4, "BTFels"));
   TESSERA_RETURN_IF_ERROR(
       codec_values_.Fill(std::span<const float>(codec.shared_values), GL_RGBA32F, 4, "codec's tables"));
+  if (!codec.shared_words.empty()) {
+    TESSERA_RETURN_IF_ERROR(codec_words_.Fill(std::span<const uint32_t>(codec.shared_words), GL_RGBA32UI, 4,
+                                              "codec's packed tables"));
+  }
 
   gl_.BindVertexArray(vertex_array_.name());
   gl_.BindBuffer(GL_ARRAY_BUFFER, vertices_.name());
@@ -296,6 +302,7 @@ void PreviewDrawing::Shade(const Light& light, int first_row, int num_rows) {
   bind(tile_index_, "tile_index");
   bind(btfel_words_, "btfel_words");
   bind(codec_values_, "codec_values");
+  bind(codec_words_, "codec_words");
 
   const auto location = [&](const char* name) { return gl_.GetUniformLocation(shade_program_, name); };
   const glm::vec3 eye = GlmFromEigen(view_.eye - triangles_.centre);

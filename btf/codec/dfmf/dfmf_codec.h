@@ -1,0 +1,19 @@
+// The codec "dfmf": one low-rank factorisation of the whole BTF, 8-bit coefficients.
+#pragma once
+
+#include "btf/codec/codec.h"
+
+namespace tessera {
+
+class DfmfCodec final : public Codec {
+ public:
+  [[nodiscard]] std::string_view id() const override { return "dfmf"; }
+  [[nodiscard]] int version() const override { return 1; }
+  [[nodiscard]] absl::StatusOr<Material> Encode(BtfSource& source, const EncodeParams& params,
+                                                const RunContext& context) const override;
+  [[nodiscard]] absl::StatusOr<Embedding> Embed(const Material& material, int dims,
+                                                const RunContext& context) const override;
+  [[nodiscard]] absl::StatusOr<CodecGlsl> Glsl(const BtfelTable& table) const override;
+};
+
+}  // namespace tessera

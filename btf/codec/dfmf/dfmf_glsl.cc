@@ -1,0 +1,300 @@
+#include "btf/codec/dfmf/dfmf_glsl.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <memory>
+#include <string>
+
+#include <absl/strings/str_cat.h>
+#include <absl/strings/substitute.h>
+
+#include "btf/base/status_macros.h"
+#include "btf/codec/dfmf/dfmf_decoder.h"
+
+namespace tessera {
+namespace {
+
+// Factors, and codes, that one step of the shader's loops takes: one texel of 16-bit factors, half a texel of
+// 8-bit codes.
+constexpr int kGroup = 8;
+constexpr int kCodesPerTexel = 16;
+
+int Groups(int count) {
+  return (count + kGroup - 1) / kGroup;
+}
+
+// Where things lie. `codec_values`: the limits, the three colour axes, a (scale, offset) for each group, then
+// for each pair of nodes what the coefficients' offsets contribute to the three components. `codec_words`:
+// for each pair of nodes a texel for each group, luminance first, then either chrominance.
+struct Layout {
+  int luma_groups = 0;
+  int chroma_groups = 0;
+  int light_nodes = 0;  // along a side
+  int view_nodes = 0;
+
+  explicit Layout(const DfmfDecoder& decoder)
+      : luma_groups(Groups(decoder.luma_rank())),
+        chroma_groups(Groups(decoder.chroma_rank())),
+        light_nodes(decoder.light_grid().nodes_per_side()),
+        view_nodes(decoder.view_grid().nodes_per_side()) {}
+
+  [[nodiscard]] int num_groups() const { return luma_groups + 2 * chroma_groups; }
+  [[nodiscard]] int pairs_begin() const { return 4 + num_groups(); }
+  [[nodiscard]] size_t num_pairs() const {
+    return static_cast<size_t>(light_nodes) * light_nodes * view_nodes * view_nodes;
+  }
+  [[nodiscard]] int btfel_texels() const {
+    return ((luma_groups + chroma_groups) * kGroup + kCodesPerTexel - 1) / kCodesPerTexel;
+  }
+};
+
+constexpr char kHead[] = R"(
+uniform usamplerBuffer btfel_words;
+uniform samplerBuffer codec_values;
+uniform usamplerBuffer codec_words;
+
+// The three nodes around a direction and their weights; btf/codec/FORMAT.md, codec dfmf.
+void FindNodes(vec3 d, float by_covered, int side, out ivec3 nodes, out vec3 weights) {
+  float radius = min(atan(length(d.xy), d.z) * by_covered, 1.0);
+  bool is_a = abs(d.y) <= abs(d.x);
+  vec2 p = is_a ? d.xy : d.yx;  // the longer one first
+  float major = p.x < 0.0 ? -radius : radius;
+  float minor = p.x == 0.0 ? 0.0 : major * atan(p.y / p.x) * 1.273239544735163;
+  int center = side >> 1;
+  vec2 at = ((is_a ? vec2(major, minor) : vec2(minor, major)) + 1.0) * float(center);
+  ivec2 cell = clamp(ivec2(at), ivec2(0), ivec2(side - 2));
+  float f = at.x - float(cell.x), g = at.y - float(cell.y);
+  int first = cell.x * side + cell.y;
+  bool inward = (cell.x < center) == (cell.y < center);
+  bool low = inward ? f >= g : f + g <= 1.0;
+  nodes = first + (inward ? ivec3(0, low ? side : 1, side + 1) : ivec3(low ? 0 : side + 1, side, 1));
+  weights = inward ? (low ? vec3(1.0 - f, f - g, g) : vec3(1.0 - g, g - f, f))
+                   : (low ? vec3(1.0 - f - g, f, g) : vec3(f + g - 1.0, 1.0 - g, 1.0 - f));
+}
+
+vec4 Low(uvec4 u) { return vec4(u & 65535u); }
+vec4 High(uvec4 u) { return vec4(u >> 16); }
+)";
+
+// The factors of group `group`: even ones in `even`, odd ones in `odd`.
+std::string Interpolate(const std::string& group, const std::string& suffix) {
+  std::string out = absl::Substitute("    vec4 even$0 = vec4(0.0), odd$0 = vec4(0.0);\n", suffix);
+  for (int i = 0; i < 3; ++i) {
+    for (int j = 0; j < 3; ++j) {
+      absl::StrAppend(&out, absl::Substitute("    u = texelFetch(codec_words, words$0[$1] + $2); even$3 += "
+                                             "pair$0[$1] * Low(u); odd$3 += pair$0[$1] * High(u);\n",
+                                             i, j, group, suffix));
+    }
+  }
+  absl::StrAppend(&out,
+                  absl::Substitute("    q = texelFetch(codec_values, 4 + $0);\n    even$1 = even$1 * q.x "
+                                   "+ q.y; odd$1 = odd$1 * q.x + q.y;\n",
+                                   group, suffix));
+  return out;
+}
+
+// The weighted sum of the BTFels' codes in code group `group`, in `low` and `high`: codes 0 2 4 6 and 1 3 5
+// 7, as the factors.
+std::string BlendCodes(const std::string& group, int btfel_texels) {
+  return absl::Substitute(R"(    vec4 even_codes = vec4(0.0), odd_codes = vec4(0.0);
+    for (int n = 0; n < count; ++n) {
+      u = texelFetch(btfel_words, btfels[n] * $1 + (($0) >> 1));
+      uvec2 c = (($0) & 1) == 0 ? u.xy : u.zw;
+      even_codes += weights[n] * vec4(c.x & 255u, (c.x >> 16) & 255u, c.y & 255u, (c.y >> 16) & 255u);
+      odd_codes += weights[n] * vec4((c.x >> 8) & 255u, c.x >> 24, (c.y >> 8) & 255u, c.y >> 24);
+    }
+)",
+                          group, btfel_texels);
+}
+
+std::string Source(const Layout& layout) {
+  std::string out = kHead;
+  absl::StrAppend(&out, absl::Substitute(R"(
+vec3 BlendUnturned(ivec4 btfels, vec4 weights, int count, vec3 light, vec3 view) {
+  vec4 limits = texelFetch(codec_values, 0);
+  // Loops of no steps, since llvmpipe leaves loops early but not functions.
+  bool is_lit = light.z > 0.0 && view.z > 0.0 && count > 0;
+  int luma_groups = is_lit ? $0 : 0;
+  int chroma_groups = is_lit ? $1 : 0;
+  ivec3 light_nodes, view_nodes;
+  vec3 light_weights, view_weights;
+  FindNodes(light, limits.y, $2, light_nodes, light_weights);
+  FindNodes(view, limits.z, $3, view_nodes, view_weights);
+  float total = 0.0;
+  for (int n = 0; n < count; ++n) {
+    total += weights[n];
+  }
+  ivec3 pairs0 = light_nodes.x * $4 + view_nodes, pairs1 = light_nodes.y * $4 + view_nodes;
+  ivec3 pairs2 = light_nodes.z * $4 + view_nodes;
+  vec3 pair0 = light_weights.x * view_weights, pair1 = light_weights.y * view_weights;
+  vec3 pair2 = light_weights.z * view_weights;
+  vec3 sum = vec3(0.0);
+  for (int i = 0; i < min(luma_groups, 1); ++i) {
+)",
+                                         layout.luma_groups, layout.chroma_groups, layout.light_nodes,
+                                         layout.view_nodes, layout.view_nodes * layout.view_nodes));
+  for (int i = 0; i < 3; ++i) {
+    for (int j = 0; j < 3; ++j) {
+      absl::StrAppend(
+          &out, absl::Substitute("    sum += pair$0[$1] * texelFetch(codec_values, $2 + pairs$0[$1]).xyz;\n",
+                                 i, j, layout.pairs_begin()));
+    }
+  }
+  absl::StrAppend(&out, "    sum *= total;\n  }\n");
+  for (int i = 0; i < 3; ++i) {
+    absl::StrAppend(&out, absl::Substitute("  ivec3 words$0 = pairs$0 * $1;\n", i, layout.num_groups()));
+  }
+  absl::StrAppend(&out, "  uvec4 u;\n  vec4 q;\n  for (int g = 0; g < luma_groups; ++g) {\n",
+                  Interpolate("g", ""), BlendCodes("g", layout.btfel_texels()),
+                  "    sum.x += dot(even, even_codes) + dot(odd, odd_codes);\n  }\n");
+  if (layout.chroma_groups > 0) {
+    const std::string first = absl::StrCat("g + ", layout.luma_groups);
+    absl::StrAppend(&out, "  for (int g = 0; g < chroma_groups; ++g) {\n", Interpolate(first, "1"),
+                    Interpolate(absl::StrCat("g + ", layout.luma_groups + layout.chroma_groups), "2"),
+                    BlendCodes(first, layout.btfel_texels()),
+                    "    sum.y += dot(even1, even_codes) + dot(odd1, odd_codes);\n"
+                    "    sum.z += dot(even2, even_codes) + dot(odd2, odd_codes);\n  }\n");
+  }
+  absl::StrAppend(&out, R"(
+  float scale = light.z < limits.x ? light.z / limits.x : 1.0;
+  return scale * (sum.x * texelFetch(codec_values, 1).xyz + sum.y * texelFetch(codec_values, 2).xyz +
+                  sum.z * texelFetch(codec_values, 3).xyz);
+}
+
+// One sum for each turn at hand, under the turned directions.
+vec3 BlendBtfels(ivec4 btfels, ivec4 turns, vec4 weights, int count, vec3 light, vec3 view) {
+  vec3 sum = vec3(0.0);
+  for (int turn = 0; turn < 4; ++turn) {
+    ivec4 group = ivec4(0);
+    vec4 group_weights = vec4(0.0);
+    int group_count = 0;
+    for (int n = 0; n < 4; ++n) {
+      if (n < count && turns[n] == turn) {
+        group[group_count] = btfels[n];
+        group_weights[group_count] = weights[n];
+        ++group_count;
+      }
+    }
+    for (int i = 0; i < min(group_count, 1); ++i) {
+      sum += BlendUnturned(group, group_weights, group_count, light, view);
+    }
+    light.xy = vec2(light.y, -light.x);
+    view.xy = vec2(view.y, -view.x);
+  }
+  return sum;
+}
+)");
+  return out;
+}
+
+// Factors of one group in the order of the table: the first, their number, the first coefficient they
+// multiply.
+struct Group {
+  int factor = 0;
+  int count = 0;
+  int coefficient = 0;
+};
+
+std::vector<Group> GroupsOf(const DfmfDecoder& decoder) {
+  std::vector<Group> groups;
+  const auto add = [&groups](int factor, int coefficient, int rank) {
+    for (int i = 0; i < rank; i += kGroup) {
+      groups.push_back({factor + i, std::min(kGroup, rank - i), coefficient + i});
+    }
+  };
+  const int r = decoder.luma_rank();
+  const int q = decoder.chroma_rank();
+  add(0, 0, r);
+  add(r, r, q);
+  add(r + q, r, q);
+  return groups;
+}
+
+void PackFactors(const DfmfDecoder& decoder, const BtfelTable& table, const Layout& layout, CodecGlsl& glsl) {
+  const std::span<const float> grid = decoder.grid();
+  const int num_factors = decoder.num_factors();
+  const std::vector<Group> groups = GroupsOf(decoder);
+  glsl.shared_words.resize(layout.num_pairs() * groups.size() * 4);
+  for (size_t g = 0; g < groups.size(); ++g) {
+    const Group& group = groups[g];
+    float low = std::numeric_limits<float>::infinity();
+    float high = -low;
+    for (size_t pair = 0; pair < layout.num_pairs(); ++pair) {
+      for (int i = 0; i < group.count; ++i) {
+        const float w = grid[pair * num_factors + group.factor + i] * table.step[group.coefficient + i];
+        low = std::min(low, w);
+        high = std::max(high, w);
+      }
+    }
+    constexpr float kMost = 65535.0F;
+    const float scale = (high - low) / kMost;
+    const float inverse = scale > 0.0F ? 1.0F / scale : 0.0F;
+    glsl.shared_values[4 * (4 + g)] = scale;
+    glsl.shared_values[4 * (4 + g) + 1] = low;
+    for (size_t pair = 0; pair < layout.num_pairs(); ++pair) {
+      uint32_t* const words = glsl.shared_words.data() + (pair * groups.size() + g) * 4;
+      for (int i = 0; i < group.count; ++i) {
+        const float w = grid[pair * num_factors + group.factor + i] * table.step[group.coefficient + i];
+        const float code = std::clamp((w - low) * inverse + 0.5F, 0.0F, kMost);
+        words[i / 2] |= static_cast<uint32_t>(code) << (16 * (i % 2));
+      }
+    }
+  }
+  // What the offsets contribute, whatever the codes.
+  const int r = decoder.luma_rank();
+  const int q = decoder.chroma_rank();
+  for (size_t pair = 0; pair < layout.num_pairs(); ++pair) {
+    const float* const w = grid.data() + pair * num_factors;
+    double sums[3] = {0.0, 0.0, 0.0};
+    for (int i = 0; i < r; ++i) {
+      sums[0] += static_cast<double>(w[i]) * table.offset[i];
+    }
+    for (int i = 0; i < q; ++i) {
+      sums[1] += static_cast<double>(w[r + i]) * table.offset[r + i];
+      sums[2] += static_cast<double>(w[r + q + i]) * table.offset[r + i];
+    }
+    for (int j = 0; j < 3; ++j) {
+      glsl.shared_values[4 * (layout.pairs_begin() + pair) + j] = static_cast<float>(sums[j]);
+    }
+  }
+}
+
+}  // namespace
+
+absl::StatusOr<CodecGlsl> DfmfGlsl(const BtfelTable& table) {
+  TESSERA_ASSIGN_OR_RETURN(const std::unique_ptr<DfmfDecoder> decoder, DfmfDecoder::Create(table));
+  const size_t k = table.num_coefficients;
+  if (table.codes.size() % k != 0) {
+    return absl::InvalidArgumentError(
+        absl::StrCat(table.codes.size(), " codes are not a multiple of ", k, " coefficients"));
+  }
+  const Layout layout(*decoder);
+  CodecGlsl glsl;
+  glsl.source = Source(layout);
+  glsl.shared_values.resize(4 * (layout.pairs_begin() + layout.num_pairs()));
+  glsl.shared_values[0] = static_cast<float>(std::cos(decoder->max_light_theta_rad()));
+  glsl.shared_values[1] = static_cast<float>(1.0 / decoder->light_grid().covered_rad());
+  glsl.shared_values[2] = static_cast<float>(1.0 / decoder->view_grid().covered_rad());
+  for (int j = 0; j < 3; ++j) {
+    for (int channel = 0; channel < 3; ++channel) {
+      glsl.shared_values[4 * (1 + j) + channel] = static_cast<float>(decoder->colour()(channel, j));
+    }
+  }
+  PackFactors(*decoder, table, layout, glsl);
+
+  glsl.words_per_btfel = layout.btfel_texels() * 4;
+  glsl.btfel_words.resize(table.size() * glsl.words_per_btfel);
+  const size_t r = decoder->luma_rank();
+  for (size_t btfel = 0; btfel < table.size(); ++btfel) {
+    const std::span<const uint8_t> codes = table.btfel(btfel);
+    uint32_t* const words = glsl.btfel_words.data() + btfel * glsl.words_per_btfel;
+    for (size_t i = 0; i < k; ++i) {
+      const size_t place = i < r ? i : static_cast<size_t>(layout.luma_groups) * kGroup + (i - r);
+      words[place / 4] |= static_cast<uint32_t>(codes[i]) << (8 * (place % 4));
+    }
+  }
+  return glsl;
+}
+
+}  // namespace tessera
