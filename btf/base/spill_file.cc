@@ -12,19 +12,11 @@
 #include <sys/statvfs.h>
 #include <unistd.h>
 
+#include "btf/base/file_error.h"
 #include "btf/base/status_macros.h"
 
 namespace tessera {
 namespace {
-
-absl::Status FileError(int error_number, std::string_view what, const std::string& name) {
-  const std::string message = absl::StrCat(name, ": ", absl::string_view(what.data(), what.size()), ": ",
-                                           std::generic_category().message(error_number));
-  return error_number == ENOSPC || error_number == EDQUOT || error_number == ENOMEM ||
-                 error_number == EMFILE || error_number == ENFILE
-             ? absl::ResourceExhaustedError(message)
-             : absl::InternalError(message);
-}
 
 // A file that no folder lists, -1 and errno on failure.
 int OpenNameless(const std::filesystem::path& folder) {

@@ -45,7 +45,7 @@ class BtfSource {
   // Fills `samples` with rows [row_begin, row_begin + num_rows), float32, laid out
   // [row][x][channel 0..2][view][light], light fastest. samples.size() must be num_rows * SamplesPerRow().
   // Encoders ask for rows in ascending order, each once per pass; a source may be read in several passes.
-  // Errors: INVALID_ARGUMENT (size or range), CANCELLED, DATA_LOSS or UNAVAILABLE from the medium. Not
+  // Errors: INVALID_ARGUMENT (size or range), CANCELLED, DATA_LOSS or INTERNAL from the medium. Not
   // thread-safe.
   [[nodiscard]] virtual absl::Status ReadRows(int row_begin, int num_rows, std::span<float> samples,
                                               const RunContext& context) = 0;

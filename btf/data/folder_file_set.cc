@@ -4,6 +4,7 @@
 
 #include <absl/strings/str_cat.h>
 
+#include "btf/base/file_error.h"
 #include "btf/base/status_macros.h"
 #include "btf/data/error_list.h"
 #include "btf/data/file_set.h"

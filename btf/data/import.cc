@@ -9,6 +9,7 @@
 
 #include <absl/strings/str_cat.h>
 
+#include "btf/base/file_error.h"
 #include "btf/base/status_macros.h"
 #include "btf/data/import_images.h"
 #include "btf/data/layouts.h"

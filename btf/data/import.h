@@ -54,7 +54,7 @@ struct ImportOptions {
 //
 // Errors: INVALID_ARGUMENT (budget, layout not recognised, missing, duplicate, differently sized images,
 // unknown names, values that are not finite), DATA_LOSS (truncated or damaged), NOT_FOUND, PERMISSION_DENIED,
-// RESOURCE_EXHAUSTED (limits on archives and images, no space for the spill file), UNAVAILABLE (read or write
+// RESOURCE_EXHAUSTED (limits on archives and images, no space for the spill file), INTERNAL (read or write
 // failed), CANCELLED. Messages name the first few of the images concerned, and how many there are.
 [[nodiscard]] absl::StatusOr<std::unique_ptr<BtfSource>> ImportBtf(const std::filesystem::path& path,
                                                                    const ImportOptions& options,

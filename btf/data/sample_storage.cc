@@ -11,9 +11,9 @@
 
 #include <absl/strings/str_cat.h>
 
+#include "btf/base/file_error.h"
 #include "btf/base/status_macros.h"
 #include "btf/data/transposed_samples.h"
-#include "btf/image/byte_stream.h"
 
 namespace tessera {
 

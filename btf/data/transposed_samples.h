@@ -66,7 +66,7 @@ class SampleStorage {
 // Errors: RESOURCE_EXHAUSTED.
 [[nodiscard]] absl::StatusOr<std::unique_ptr<SampleStorage>> MakeMemoryStorage(uint64_t size_bytes);
 // A file without a name in `folder`, its space reserved: gone when the storage is, even after a kill.
-// Errors: RESOURCE_EXHAUSTED naming the bytes needed and free; NOT_FOUND, PERMISSION_DENIED, UNAVAILABLE.
+// Errors: RESOURCE_EXHAUSTED naming the bytes needed and free; NOT_FOUND, PERMISSION_DENIED, INTERNAL.
 [[nodiscard]] absl::StatusOr<std::unique_ptr<SampleStorage>> MakeSpillFile(
     const std::filesystem::path& folder, uint64_t size_bytes);
 

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cerrno>
 #include <cstring>
-#include <system_error>
 #include <utility>
 
 #include <fcntl.h>
@@ -12,6 +11,7 @@
 
 #include <absl/strings/str_cat.h>
 
+#include "btf/base/file_error.h"
 #include "btf/base/status_macros.h"
 
 namespace tessera {
@@ -143,29 +143,6 @@ absl::StatusOr<std::string> ReadAll(ByteStream& stream, uint64_t limit_bytes) {
     if (count < kStep) {
       return bytes;
     }
-  }
-}
-
-absl::Status FileError(int error_number, std::string_view what, const std::string& name) {
-  const std::string message = absl::StrCat(name, ": ", absl::string_view(what.data(), what.size()), ": ",
-                                           std::generic_category().message(error_number));
-  switch (error_number) {
-    case ENOENT:
-    case ENOTDIR:
-      return absl::NotFoundError(message);
-    case EACCES:
-    case EPERM:
-    case EROFS:
-      return absl::PermissionDeniedError(message);
-    case ENOSPC:
-    case EDQUOT:
-    case EFBIG:
-    case EMFILE:
-    case ENFILE:
-    case ENOMEM:
-      return absl::ResourceExhaustedError(message);
-    default:
-      return absl::UnavailableError(message);
   }
 }
 

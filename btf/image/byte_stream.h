@@ -20,10 +20,10 @@ class ByteStream {
 
   [[nodiscard]] virtual uint64_t size() const = 0;
   // The next bytes, as many as fit into `bytes`, fewer only at the end. Returns their number, 0 at the end.
-  // Errors: UNAVAILABLE or DATA_LOSS from the medium.
+  // Errors: INTERNAL or DATA_LOSS from the medium.
   [[nodiscard]] virtual absl::StatusOr<size_t> Read(std::span<std::byte> bytes) = 0;
 
-  // Seek is legal only if seekable(). Errors: INVALID_ARGUMENT beyond the end, UNAVAILABLE.
+  // Seek is legal only if seekable(). Errors: INVALID_ARGUMENT beyond the end.
   [[nodiscard]] virtual bool seekable() const = 0;
   [[nodiscard]] virtual absl::Status Seek(uint64_t position) = 0;
 
@@ -36,15 +36,11 @@ class ByteStream {
 [[nodiscard]] std::unique_ptr<ByteStream> MakeMemoryStream(std::span<const std::byte> bytes);
 // Owns `bytes`.
 [[nodiscard]] std::unique_ptr<ByteStream> MakeMemoryStream(std::string bytes);
-// A regular file. Errors: NOT_FOUND, PERMISSION_DENIED, INVALID_ARGUMENT (not a regular file), UNAVAILABLE.
+// A regular file. Errors: NOT_FOUND, PERMISSION_DENIED, INVALID_ARGUMENT (not a regular file), INTERNAL.
 [[nodiscard]] absl::StatusOr<std::unique_ptr<ByteStream>> OpenFileStream(const std::filesystem::path& path);
 
 // All bytes from the current position on. Errors: RESOURCE_EXHAUSTED when the stream says, or turns out, to
 // hold more than `limit_bytes`; those of Read.
 [[nodiscard]] absl::StatusOr<std::string> ReadAll(ByteStream& stream, uint64_t limit_bytes);
-
-// The status of a failed system call on a file: NOT_FOUND, PERMISSION_DENIED, RESOURCE_EXHAUSTED (no space,
-// quota, descriptors), else UNAVAILABLE; the message is "NAME: what: reason".
-[[nodiscard]] absl::Status FileError(int error_number, std::string_view what, const std::string& name);
 
 }  // namespace tessera

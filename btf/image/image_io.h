@@ -2,7 +2,7 @@
 //
 //   TESSERA_ASSIGN_OR_RETURN(Image height, ReadImage("height.png", Transfer::Linear()));
 //   TESSERA_ASSIGN_OR_RETURN(std::string png, EncodePng(picture));
-//   TESSERA_RETURN_IF_ERROR(WriteFile("picture.png", png));
+//   TESSERA_RETURN_IF_ERROR(WriteFileAtomically("picture.png", png));
 //
 // Formats are told apart by their first bytes, never by name. What is read: PNG gray, RGB, palette, with or
 // without alpha, up to 16 bits; JPEG gray and YCbCr/RGB, 8 bits; EXR scanline or tiled, half, float or uint,
@@ -43,10 +43,5 @@ inline constexpr int kMaxImageSide = 16384;
 enum class ExrDepth { kHalf, kFloat };
 // Linear OpenEXR, ZIP-compressed scanlines, channels Y, RGB or RGBA. Errors: INVALID_ARGUMENT (shape).
 [[nodiscard]] absl::StatusOr<std::string> EncodeExr(const Image& image, ExrDepth depth = ExrDepth::kHalf);
-
-// Writes to a temporary file beside `path`, flushes it to disk and renames it: `path` holds the old bytes or
-// the new ones, never a part. Errors: NOT_FOUND, PERMISSION_DENIED, RESOURCE_EXHAUSTED (disk full),
-// UNAVAILABLE.
-[[nodiscard]] absl::Status WriteFile(const std::filesystem::path& path, std::string_view bytes);
 
 }  // namespace tessera

@@ -71,7 +71,7 @@ class ImageReader {
 
   // The next rows, interleaved samples in native byte order. rows.size() must be num_rows *
   // RowBytes(header()). After the last row the rest of the file is checked too. Errors: INVALID_ARGUMENT
-  // (size, past the end), DATA_LOSS (truncated or damaged), UNAVAILABLE (medium), all naming the image.
+  // (size, past the end), DATA_LOSS (truncated or damaged), INTERNAL (medium), all naming the image.
   [[nodiscard]] absl::Status ReadRows(int num_rows, std::span<std::byte> rows);
 
  protected:

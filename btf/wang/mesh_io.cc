@@ -1,7 +1,6 @@
 #include "btf/wang/mesh_io.h"
 
 #include <algorithm>
-#include <fstream>
 #include <string>
 #include <system_error>
 
@@ -9,6 +8,8 @@
 #include <absl/strings/str_cat.h>
 #include <Eigen/Geometry>
 
+#include "btf/base/atomic_file.h"
+#include "btf/base/file_error.h"
 #include "btf/base/status_macros.h"
 #include "btf/wang/mesh_text.h"
 #include "btf/wang/mesh_topology.h"
@@ -128,17 +129,13 @@ absl::StatusOr<QuadMesh> ReadQuadMesh(const std::filesystem::path& path, MeshRea
   }
   const uintmax_t size = std::filesystem::file_size(path, error);
   if (error) {
-    return absl::UnavailableError(absl::StrCat(path.string(), ": ", error.message()));
+    return FileError(error.value(), "cannot read", path);
   }
   if (size > kMaxMeshFileBytes) {
     return absl::ResourceExhaustedError(
         absl::StrCat(path.string(), ": the file has ", size, " bytes; the limit is ", kMaxMeshFileBytes));
   }
-  std::string text(size, '\0');
-  std::ifstream file(path, std::ios::binary);
-  if (!file.read(text.data(), static_cast<std::streamsize>(size))) {
-    return absl::UnavailableError(absl::StrCat(path.string(), ": cannot be read"));
-  }
+  TESSERA_ASSIGN_OR_RETURN(const std::string text, ReadWholeFile(path));
   return ParseQuadMesh(std::as_bytes(std::span(text)), path.filename().string(), notes);
 }
 

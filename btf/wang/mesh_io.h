@@ -43,7 +43,7 @@ struct MeshReadNotes {
                                                      std::string_view file_name,
                                                      MeshReadNotes* notes = nullptr);
 
-// ParseQuadMesh of a file. Errors: also NOT_FOUND and UNAVAILABLE naming the path.
+// ParseQuadMesh of a file. Errors: also NOT_FOUND, PERMISSION_DENIED and INTERNAL naming the path.
 [[nodiscard]] absl::StatusOr<QuadMesh> ReadQuadMesh(const std::filesystem::path& path,
                                                     MeshReadNotes* notes = nullptr);
 

@@ -5,6 +5,7 @@
 #include <fmt/format.h>
 #include <sys/resource.h>
 
+#include "btf/base/atomic_file.h"
 #include "btf/base/status_macros.h"
 #include "btf/codec/codec.h"
 #include "btf/codec/diagnosis.h"
@@ -14,7 +15,6 @@
 #include "client/cli/commands.h"
 #include "client/cli/describe.h"
 #include "client/cli/exit_codes.h"
-#include "client/lib/atomic_file.h"
 #include "client/lib/flat_decode.h"
 #include "client/lib/names.h"
 #include "proto/wire/status.h"

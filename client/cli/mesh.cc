@@ -5,6 +5,7 @@
 
 #include <fmt/format.h>
 
+#include "btf/base/atomic_file.h"
 #include "btf/base/status_macros.h"
 #include "btf/wang/arrangement.h"
 #include "btf/wang/dress.h"
@@ -15,7 +16,6 @@
 #include "client/cli/arguments.h"
 #include "client/cli/commands.h"
 #include "client/cli/describe.h"
-#include "client/lib/atomic_file.h"
 #include "client/lib/names.h"
 
 namespace tessera::cli {

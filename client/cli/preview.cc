@@ -6,11 +6,11 @@
 
 #include <fmt/format.h>
 
+#include "btf/base/atomic_file.h"
 #include "btf/base/status_macros.h"
 #include "client/cli/arguments.h"
 #include "client/cli/commands.h"
 #include "client/cli/exit_codes.h"
-#include "client/lib/atomic_file.h"
 #include "client/lib/names.h"
 
 namespace tessera::cli {

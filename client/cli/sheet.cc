@@ -1,12 +1,12 @@
 // tessera sheet
 #include <memory>
 
+#include "btf/base/atomic_file.h"
 #include "btf/base/status_macros.h"
 #include "btf/image/image_io.h"
 #include "client/cli/arguments.h"
 #include "client/cli/commands.h"
 #include "client/cli/contact_sheet.h"
-#include "client/lib/atomic_file.h"
 
 namespace tessera::cli {
 namespace {

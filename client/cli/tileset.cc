@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 
+#include "btf/base/atomic_file.h"
 #include "btf/base/status_macros.h"
 #include "btf/image/image_io.h"
 #include "btf/render/sheet.h"
@@ -10,7 +11,6 @@
 #include "client/cli/certificate.h"
 #include "client/cli/commands.h"
 #include "client/cli/describe.h"
-#include "client/lib/atomic_file.h"
 #include "client/lib/names.h"
 
 namespace tessera::cli {

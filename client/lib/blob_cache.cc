@@ -12,9 +12,10 @@
 #include <sys/file.h>
 #include <unistd.h>
 
+#include "btf/base/atomic_file.h"
+#include "btf/base/file_error.h"
 #include "btf/base/sha256.h"
 #include "btf/base/status_macros.h"
-#include "client/lib/atomic_file.h"
 
 namespace tessera {
 namespace fs = std::filesystem;
@@ -75,7 +76,7 @@ absl::Status BlobCache::Partial::Append(std::string_view bytes) {
   while (!bytes.empty()) {
     const ssize_t written = ::write(descriptor_, bytes.data(), bytes.size());
     if (written < 0 && errno != EINTR) {
-      return FileError(errno, "writing", path_);
+      return FileError(errno, "cannot write", path_);
     }
     bytes.remove_prefix(written < 0 ? 0 : static_cast<size_t>(written));
   }
@@ -84,7 +85,7 @@ absl::Status BlobCache::Partial::Append(std::string_view bytes) {
 
 absl::Status BlobCache::Partial::Clear() {
   if (::ftruncate(descriptor_, 0) != 0) {
-    return FileError(errno, "truncating", path_);
+    return FileError(errno, "cannot truncate", path_);
   }
   return absl::OkStatus();
 }
@@ -99,11 +100,11 @@ absl::StatusOr<BlobCache::Partial> BlobCache::Begin(std::string_view sha256) con
   std::error_code error;
   fs::create_directories(path.parent_path(), error);
   if (error) {
-    return FileError(error.value(), "creating", path.parent_path());
+    return FileError(error.value(), "cannot create", path.parent_path());
   }
   const int descriptor = ::open(path.c_str(), O_RDWR | O_CREAT | O_APPEND | O_CLOEXEC, 0644);
   if (descriptor < 0) {
-    return FileError(errno, "opening", path);
+    return FileError(errno, "cannot open", path);
   }
   Partial partial(descriptor, path);
   if (::flock(descriptor, LOCK_EX | LOCK_NB) != 0) {
@@ -120,7 +121,7 @@ absl::Status BlobCache::Finish(Partial partial, std::string_view sha256) const {
     fs::rename(partial.path_, path, error);
   }
   if (error) {
-    return FileError(error.value(), "creating", path);
+    return FileError(error.value(), "cannot create", path);
   }
   DropOldest(path);
   return absl::OkStatus();

@@ -11,9 +11,10 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include "btf/base/atomic_file.h"
+#include "btf/base/file_error.h"
 #include "btf/base/sha256.h"
 #include "btf/base/status_macros.h"
-#include "client/lib/atomic_file.h"
 #include "client/lib/background_sha256.h"
 #include "client/lib/blob_cache.h"
 #include "client/lib/client.h"
@@ -208,10 +209,10 @@ class InputFile {
   absl::StatusOr<uint64_t> Size() const {
     struct stat info = {};
     if (descriptor_ < 0) {
-      return FileError(error_, "opening", path_);
+      return FileError(error_, "cannot open", path_);
     }
     if (::fstat(descriptor_, &info) != 0) {
-      return FileError(errno, "reading", path_);
+      return FileError(errno, "cannot read", path_);
     }
     if (!S_ISREG(info.st_mode)) {
       return absl::InvalidArgumentError(absl::StrCat(path_.string(), ": not a regular file"));
@@ -230,7 +231,7 @@ class InputFile {
         continue;
       }
       if (got < 0) {
-        return FileError(errno, "reading", path_);
+        return FileError(errno, "cannot read", path_);
       }
       if (got == 0) {
         return absl::DataLossError(absl::StrCat(path_.string(), ": became shorter while it was read"));

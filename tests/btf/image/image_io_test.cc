@@ -106,34 +106,5 @@ TEST(ImageIoTest, ReadImageNamesTheFile) {
   EXPECT_EQ(ReadImage("/tmp", std::nullopt).status().code(), absl::StatusCode::kInvalidArgument);
 }
 
-class WriteFileTest : public ::testing::Test {
- protected:
-  WriteFileTest() {
-    std::string pattern = (std::filesystem::temp_directory_path() / "write_file_test.XXXXXX").string();
-    folder_ = mkdtemp(pattern.data());
-  }
-  ~WriteFileTest() override { std::filesystem::remove_all(folder_); }
-  [[nodiscard]] size_t NumFiles() const {
-    return std::distance(std::filesystem::directory_iterator(folder_), {});
-  }
-  std::filesystem::path folder_;
-};
-
-TEST_F(WriteFileTest, ReplacesAndLeavesNothingElse) {
-  const auto path = folder_ / "a.bin";
-  ASSERT_TRUE(WriteFile(path, "old").ok());
-  ASSERT_TRUE(WriteFile(path, "new bytes").ok());
-  std::ifstream in(path);
-  EXPECT_EQ(std::string(std::istreambuf_iterator<char>(in), {}), "new bytes");
-  EXPECT_EQ(NumFiles(), 1u);
-}
-
-TEST_F(WriteFileTest, FailsCleanly) {
-  EXPECT_EQ(WriteFile(folder_ / "missing" / "a", "x").code(), absl::StatusCode::kNotFound);
-  std::filesystem::create_directory(folder_ / "folder");
-  EXPECT_FALSE(WriteFile(folder_ / "folder", "x").ok());  // a folder is in the way of the rename
-  EXPECT_EQ(NumFiles(), 1u);
-}
-
 }  // namespace
 }  // namespace tessera

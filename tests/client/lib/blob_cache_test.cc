@@ -5,8 +5,8 @@
 
 #include <gtest/gtest.h>
 
+#include "btf/base/atomic_file.h"
 #include "btf/base/sha256.h"
-#include "client/lib/atomic_file.h"
 #include "tests/support/temp_folder.h"
 
 namespace tessera {

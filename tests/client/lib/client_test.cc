@@ -8,9 +8,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "btf/base/atomic_file.h"
 #include "btf/base/rng.h"
 #include "btf/base/sha256.h"
-#include "client/lib/atomic_file.h"
 #include "proto/wire/status.h"
 #include "tests/client/lib/fake_server.h"
 #include "tests/support/temp_folder.h"

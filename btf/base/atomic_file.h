@@ -17,8 +17,8 @@ namespace tessera {
 // Without Commit() nothing is left behind. Not thread-safe.
 class AtomicFile {
  public:
-  // Errors name the path and the reason: NOT_FOUND (no such folder), PERMISSION_DENIED, RESOURCE_EXHAUSTED
-  // (full disk), INTERNAL.
+  // Errors of this and the other calls are FileError's: NOT_FOUND (no such folder), PERMISSION_DENIED,
+  // INVALID_ARGUMENT (a folder of that name), RESOURCE_EXHAUSTED (full disk), INTERNAL.
   [[nodiscard]] static absl::StatusOr<AtomicFile> Create(const std::filesystem::path& path);
   AtomicFile(AtomicFile&& other) noexcept;
   AtomicFile& operator=(AtomicFile&&) = delete;
@@ -41,9 +41,5 @@ class AtomicFile {
 
 // A whole file. Errors: NOT_FOUND, PERMISSION_DENIED, INVALID_ARGUMENT (a folder), INTERNAL, naming the path.
 [[nodiscard]] absl::StatusOr<std::string> ReadWholeFile(const std::filesystem::path& path);
-
-// What errno says about `path`, as a status with the matching code.
-[[nodiscard]] absl::Status FileError(int error_number, std::string_view doing,
-                                     const std::filesystem::path& path);
 
 }  // namespace tessera

@@ -1,9 +1,8 @@
-#include "client/lib/atomic_file.h"
+#include "btf/base/atomic_file.h"
 
 #include <atomic>
 #include <cerrno>
 #include <cstdint>
-#include <cstring>
 #include <utility>
 
 #include <absl/strings/str_cat.h>
@@ -11,31 +10,10 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include "btf/base/file_error.h"
 #include "btf/base/status_macros.h"
 
 namespace tessera {
-
-absl::Status FileError(int error_number, std::string_view doing, const std::filesystem::path& path) {
-  const std::string message = absl::StrCat(absl::string_view(doing.data(), doing.size()), " ", path.string(),
-                                           ": ", std::strerror(error_number));
-  switch (error_number) {
-    case ENOENT:
-    case ENOTDIR:
-      return absl::NotFoundError(message);
-    case EACCES:
-    case EPERM:
-    case EROFS:
-      return absl::PermissionDeniedError(message);
-    case ENOSPC:
-    case EDQUOT:
-      return absl::ResourceExhaustedError(message);
-    case EISDIR:
-    case ENAMETOOLONG:
-      return absl::InvalidArgumentError(message);
-    default:
-      return absl::InternalError(message);
-  }
-}
 
 AtomicFile::AtomicFile(int descriptor, std::filesystem::path path, std::string temporary)
     : descriptor_(descriptor), path_(std::move(path)), temporary_(std::move(temporary)) {}
@@ -55,7 +33,7 @@ AtomicFile::~AtomicFile() {
 absl::StatusOr<AtomicFile> AtomicFile::Create(const std::filesystem::path& path) {
   std::error_code ignored;
   if (std::filesystem::is_directory(path, ignored)) {
-    return FileError(EISDIR, "writing", path);
+    return FileError(EISDIR, "cannot write", path);
   }
   // Not mkostemp: its files are private, and the umask cannot be read without setting it for every thread.
   static std::atomic<uint64_t> counter = 0;
@@ -66,7 +44,7 @@ absl::StatusOr<AtomicFile> AtomicFile::Create(const std::filesystem::path& path)
       return AtomicFile(descriptor, path, std::move(temporary));
     }
     if (errno != EEXIST) {
-      return FileError(errno, "creating", path);
+      return FileError(errno, "cannot create", path);
     }
   }
 }
@@ -78,7 +56,7 @@ absl::Status AtomicFile::Write(std::string_view bytes) {
       if (errno == EINTR) {
         continue;
       }
-      return FileError(errno, "writing", path_);
+      return FileError(errno, "cannot write", path_);
     }
     bytes.remove_prefix(static_cast<size_t>(written));
   }
@@ -87,10 +65,10 @@ absl::Status AtomicFile::Write(std::string_view bytes) {
 
 absl::Status AtomicFile::Commit() {
   if (::fsync(descriptor_) != 0) {
-    return FileError(errno, "writing", path_);
+    return FileError(errno, "cannot write", path_);
   }
   if (::rename(temporary_.c_str(), path_.c_str()) != 0) {
-    return FileError(errno, "renaming to", path_);
+    return FileError(errno, "cannot create", path_);
   }
   ::close(std::exchange(descriptor_, -1));
   return absl::OkStatus();
@@ -105,7 +83,7 @@ absl::Status WriteFileAtomically(const std::filesystem::path& path, std::string_
 absl::StatusOr<std::string> ReadWholeFile(const std::filesystem::path& path) {
   const int descriptor = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
   if (descriptor < 0) {
-    return FileError(errno, "opening", path);
+    return FileError(errno, "cannot open", path);
   }
   std::string bytes;
   struct stat info = {};
@@ -126,7 +104,7 @@ absl::StatusOr<std::string> ReadWholeFile(const std::filesystem::path& path) {
     if (got < 0) {
       const int error_number = errno;
       ::close(descriptor);
-      return FileError(error_number, "reading", path);
+      return FileError(error_number, "cannot read", path);
     }
     if (got == 0) {
       break;

@@ -1,8 +1,11 @@
-#include "client/lib/atomic_file.h"
+#include "btf/base/atomic_file.h"
+
+#include <cerrno>
 
 #include <gtest/gtest.h>
 #include <sys/stat.h>
 
+#include "btf/base/file_error.h"
 #include "tests/support/temp_folder.h"
 
 namespace tessera {
@@ -47,6 +50,14 @@ TEST(AtomicFileTest, NamesThePathAndTheReason) {
   EXPECT_TRUE(absl::IsInvalidArgument(WriteFileAtomically(folder.path(), "x")));
   EXPECT_TRUE(absl::IsNotFound(ReadWholeFile(folder.path() / "none").status()));
   EXPECT_TRUE(absl::IsInvalidArgument(ReadWholeFile(folder.path()).status()));
+}
+
+// The command line's exit code for UNAVAILABLE says that there is no server.
+TEST(FileErrorTest, NeverLooksLikeAMissingServer) {
+  for (const int error : {EIO, EBUSY, EAGAIN, ENOSPC, EMFILE, ENOENT, EACCES, EISDIR, 12345}) {
+    EXPECT_FALSE(absl::IsUnavailable(FileError(error, "cannot read", "a.png"))) << error;
+  }
+  EXPECT_EQ(FileError(EACCES, "cannot open", "a.png").message(), "a.png: cannot open: Permission denied");
 }
 
 TEST(AtomicFileTest, GivesTheModeOfTheUmask) {
