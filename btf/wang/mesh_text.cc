@@ -23,7 +23,8 @@ std::string Quoted(std::string_view word) {
 }
 
 absl::StatusOr<float> ParseFloat(const LineReader& reader, std::string_view word) {
-  const std::string_view digits = word.starts_with('+') ? word.substr(1) : word;
+  // from_chars takes a minus sign itself, and must not find one behind the plus.
+  const std::string_view digits = word.starts_with('+') && !word.starts_with("+-") ? word.substr(1) : word;
   double value = 0.0;
   const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), value);
   if (error != std::errc() || end != digits.data() + digits.size() ||

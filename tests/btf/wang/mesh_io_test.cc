@@ -61,6 +61,7 @@ TEST(ObjTest, RefusesDamagedNumbersByLine) {
   EXPECT_THAT(Error("v 0 inf 0\n"), HasSubstr("line 1: 'inf'"));
   EXPECT_THAT(Error("v 0 1e39 0\n"), HasSubstr("'1e39'"));
   EXPECT_THAT(Error("v 0 1,5 0\n"), HasSubstr("'1,5'"));
+  EXPECT_THAT(Error("v 0 +-5 0\n"), HasSubstr("'+-5'"));
   EXPECT_THAT(Error("\nv 0 1\n"), HasSubstr("line 2: a vertex of 2 numbers"));
   EXPECT_THAT(Error("v 0 0 0\rv 1 0 0\rv 1 1 0\r"), HasSubstr("a vertex of 11 numbers"));
   EXPECT_THAT(Error(absl::StrCat(kSquare, "f 1 2 3 x\n")), HasSubstr("line 5: 'x' is not a whole number"));
