@@ -1,0 +1,134 @@
+// Through a real socket.
+#include <span>
+
+#include <gtest/gtest.h>
+
+#include "btf/wang/arrangement.h"
+#include "btf/wang/dressing.h"
+#include "btf/wang/tile_set.h"
+#include "proto/wire/convert.h"
+#include "tests/server/support/server_fixture.h"
+
+namespace tessera {
+namespace {
+
+TEST_F(ServerTest, ArrangementsAreTheBuiltInOnes) {
+  const auto list = Stubs::Call(&v1::Arrangements::Stub::ListArrangements, *stubs_->arrangements,
+                                v1::ListArrangementsRequest());
+  ASSERT_TRUE(list.ok());
+  ASSERT_EQ(list->arrangements_size(), static_cast<int>(BuiltinArrangements().size()));
+  for (const auto& message : list->arrangements()) {
+    EXPECT_TRUE(ArrangementFromMessage(message).ok());
+  }
+  v1::GetArrangementRequest request;
+  request.set_name("arrangements/surface-96");
+  EXPECT_EQ(
+      Stubs::Call(&v1::Arrangements::Stub::GetArrangement, *stubs_->arrangements, request)->tile_codes_size(),
+      96);
+  request.set_name("arrangements/surface-97");
+  EXPECT_EQ(
+      ReasonOf(Stubs::Call(&v1::Arrangements::Stub::GetArrangement, *stubs_->arrangements, request).status()),
+      "NOT_FOUND");
+}
+
+TEST_F(ServerTest, MeshesAreDressedAndKept) {
+  v1::DressMeshRequest request;
+  request.set_arrangement("arrangements/surface-96");
+  request.set_builtin("torus");
+  request.set_seed(5);
+  const auto dress = [&] {
+    return Stubs::Call(&v1::Dressings::Stub::DressMesh, *stubs_->dressings, request);
+  };
+  const auto torus = dress();
+  ASSERT_TRUE(torus.ok()) << torus.status();
+  EXPECT_EQ(torus->num_breaks(), 0u);
+  const auto bytes = stubs_->Download(torus->dressing().sha256());
+  const auto dressing = ParseDressing(std::as_bytes(std::span(*bytes)));
+  ASSERT_TRUE(dressing.ok()) << dressing.status();
+  EXPECT_EQ(dressing->mesh.quads.size(), torus->num_quads());
+  EXPECT_EQ(dress()->dressing().sha256(), torus->dressing().sha256());
+
+  request.set_mesh_sha256(stubs_->Upload("v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3 4\n"));
+  EXPECT_TRUE(dress().ok()) << dress().status();
+  request.set_mesh_sha256(stubs_->Upload("OFF\n4 1 0\n0 0 0\n1 0 0\n1 1 0\n0 1 0\n4 0 1 2 3\n"));
+  EXPECT_TRUE(dress().ok()) << dress().status();
+  request.set_mesh_sha256(stubs_->Upload("v 0 0 0\nv 1 0 0\nv 1 1 0\nf 1 2 3\n"));
+  EXPECT_EQ(ReasonOf(dress().status()), "FORMAT_INVALID");
+  request.set_builtin("teapot");
+  EXPECT_EQ(ReasonOf(dress().status()), "NOT_FOUND");
+  request.clear_mesh();
+  EXPECT_EQ(SubjectOf(dress().status()), "mesh");
+}
+
+// Every texel of every tile shows the one BTFel of the tiny material.
+TileSet TinyTileSet() {
+  const Material material = TinyMaterial();
+  const Arrangement* arrangement = *FindArrangement("surface-96");
+  TileSet tile_set;
+  tile_set.arrangement_id = arrangement->id;
+  tile_set.arrangement_sha256 = arrangement->sha256;
+  tile_set.tile_size = 16;
+  tile_set.strip_height = 8;
+  tile_set.tile_codes = arrangement->codes;
+  tile_set.tile_index.assign(arrangement->codes.size() * 16 * 16, 0);
+  tile_set.btfels = material.btfels;
+  tile_set.btfels.codes.resize(3);
+  return tile_set;
+}
+
+TEST_F(ServerTest, PicturesAreDrawn) {
+  const auto bytes = SerializeTileSet(TinyTileSet());
+  ASSERT_TRUE(bytes.ok()) << bytes.status();
+  v1::CreateTileSetRequest create;
+  create.set_blob_sha256(stubs_->Upload(*bytes));
+  create.set_name("arrangements/plane-16/tileSets/tiny");
+  const auto create_tile_set = [&] {
+    return Stubs::Call(&v1::TileSets::Stub::CreateTileSet, *stubs_->tile_sets, create);
+  };
+  EXPECT_EQ(ReasonOf(create_tile_set().status()), "ARRANGEMENT_MISMATCH");
+  create.set_name("arrangements/surface-96/tileSets/tiny");
+  const auto created = create_tile_set();
+  ASSERT_TRUE(created.ok()) << created.status();
+  EXPECT_EQ(created->num_tiles(), 96u);
+
+  v1::RenderPreviewRequest request;
+  request.set_tile_set(create.name());
+  request.set_builtin("cube-sphere");
+  request.set_width(64);
+  request.set_height(48);
+  const auto render = [&]() -> absl::StatusOr<std::string> {
+    grpc::ClientContext context;
+    auto reader = stubs_->previews->RenderPreview(&context, request);
+    std::string picture;
+    for (v1::DataChunk chunk; reader->Read(&chunk);) {
+      picture += chunk.data();
+    }
+    const grpc::Status status = reader->Finish();
+    if (!status.ok()) {
+      return StatusFromGrpc(status);
+    }
+    return picture;
+  };
+  const auto png = render();
+  ASSERT_TRUE(png.ok()) << png.status();
+  EXPECT_EQ(png->substr(1, 3), "PNG");
+  EXPECT_EQ(*render(), *png);
+  request.set_format(v1::RenderPreviewRequest::EXR);
+  EXPECT_EQ(render()->substr(0, 4), "\x76\x2f\x31\x01");
+
+  v1::DressMeshRequest dress;
+  dress.set_arrangement("arrangements/plane-16");
+  dress.set_builtin("plane");
+  const auto plane = Stubs::Call(&v1::Dressings::Stub::DressMesh, *stubs_->dressings, dress);
+  ASSERT_TRUE(plane.ok()) << plane.status();
+  request.set_dressing_sha256(plane->dressing().sha256());
+  EXPECT_EQ(ReasonOf(render().status()), "ARRANGEMENT_MISMATCH");
+  request.set_width(5000);
+  EXPECT_EQ(SubjectOf(render().status()), "width");
+  request.set_width(64);
+  request.set_tile_set("arrangements/surface-96/tileSets/none");
+  EXPECT_EQ(ReasonOf(render().status()), "NOT_FOUND");
+}
+
+}  // namespace
+}  // namespace tessera
