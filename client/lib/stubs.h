@@ -1,37 +1,19 @@
 // The connection behind a Client, and how one call is made on it. Private to this folder.
 #pragma once
 
-#include <memory>
 #include <stop_token>
 
 #include <grpcpp/grpcpp.h>
 
 #include "client/lib/backoff.h"
 #include "client/lib/client.h"
+#include "proto/wire/service_stubs.h"
 #include "proto/wire/status.h"
-#include "tessera/v1/tessera.grpc.pb.h"
 
 namespace tessera {
 
-struct Client::Stubs {
-  explicit Stubs(const std::shared_ptr<grpc::Channel>& channel)
-      : materials(v1::Materials::NewStub(channel)),
-        arrangements(v1::Arrangements::NewStub(channel)),
-        tile_sets(v1::TileSets::NewStub(channel)),
-        jobs(v1::Jobs::NewStub(channel)),
-        dressings(v1::Dressings::NewStub(channel)),
-        previews(v1::Previews::NewStub(channel)),
-        blobs(v1::Blobs::NewStub(channel)),
-        server_info(v1::ServerInfo::NewStub(channel)) {}
-
-  std::unique_ptr<v1::Materials::Stub> materials;
-  std::unique_ptr<v1::Arrangements::Stub> arrangements;
-  std::unique_ptr<v1::TileSets::Stub> tile_sets;
-  std::unique_ptr<v1::Jobs::Stub> jobs;
-  std::unique_ptr<v1::Dressings::Stub> dressings;
-  std::unique_ptr<v1::Previews::Stub> previews;
-  std::unique_ptr<v1::Blobs::Stub> blobs;
-  std::unique_ptr<v1::ServerInfo::Stub> server_info;
+struct Client::Stubs : ServiceStubs {
+  using ServiceStubs::ServiceStubs;
 };
 
 // One call's gRPC context; a stop request cancels the call wherever it waits.

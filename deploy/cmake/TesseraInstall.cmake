@@ -22,7 +22,7 @@ foreach(folder btf/base btf/math btf/codec btf/wang proto/wire client/lib)
   install(DIRECTORY "${PROJECT_SOURCE_DIR}/${folder}/" DESTINATION "${include_dir}/${folder}" COMPONENT sdk
           FILES_MATCHING PATTERN "*.h"
           PATTERN "codec.h" EXCLUDE PATTERN "quantize.h" EXCLUDE PATTERN "dsh" EXCLUDE PATTERN "parallel.h" EXCLUDE
-          PATTERN "convert.h" EXCLUDE PATTERN "stubs.h" EXCLUDE PATTERN "backoff.h" EXCLUDE)
+          PATTERN "convert.h" EXCLUDE PATTERN "*stubs.h" EXCLUDE PATTERN "backoff.h" EXCLUDE)
 endforeach()
 install(FILES "${PROJECT_SOURCE_DIR}/btf/data/btf_source.h" DESTINATION "${include_dir}/btf/data" COMPONENT sdk)
 install(FILES "${PROJECT_SOURCE_DIR}/btf/image/image.h" DESTINATION "${include_dir}/btf/image" COMPONENT sdk)

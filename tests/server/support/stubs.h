@@ -9,8 +9,8 @@
 #include <gtest/gtest.h>
 
 #include "btf/base/sha256.h"
+#include "proto/wire/service_stubs.h"
 #include "proto/wire/status.h"
-#include "tessera/v1/tessera.grpc.pb.h"
 
 namespace tessera {
 
@@ -18,17 +18,11 @@ inline std::string DigestOf(const std::string& bytes) {
   return Sha256Hex(std::as_bytes(std::span(bytes)));
 }
 
-struct Stubs {
+struct Stubs : ServiceStubs {
   explicit Stubs(const std::string& address)
-      : channel(grpc::CreateChannel(address, grpc::InsecureChannelCredentials())),
-        materials(v1::Materials::NewStub(channel)),
-        arrangements(v1::Arrangements::NewStub(channel)),
-        tile_sets(v1::TileSets::NewStub(channel)),
-        jobs(v1::Jobs::NewStub(channel)),
-        dressings(v1::Dressings::NewStub(channel)),
-        previews(v1::Previews::NewStub(channel)),
-        blobs(v1::Blobs::NewStub(channel)),
-        server_info(v1::ServerInfo::NewStub(channel)) {}
+      : Stubs(grpc::CreateChannel(address, grpc::InsecureChannelCredentials())) {}
+  explicit Stubs(const std::shared_ptr<grpc::Channel>& connection)
+      : ServiceStubs(connection), channel(connection) {}
 
   // Calls a unary method: Call(&v1::Jobs::Stub::GetJob, *jobs, request).
   template <typename Stub, typename Request, typename Response>
@@ -134,14 +128,6 @@ struct Stubs {
   }
 
   std::shared_ptr<grpc::Channel> channel;
-  std::unique_ptr<v1::Materials::Stub> materials;
-  std::unique_ptr<v1::Arrangements::Stub> arrangements;
-  std::unique_ptr<v1::TileSets::Stub> tile_sets;
-  std::unique_ptr<v1::Jobs::Stub> jobs;
-  std::unique_ptr<v1::Dressings::Stub> dressings;
-  std::unique_ptr<v1::Previews::Stub> previews;
-  std::unique_ptr<v1::Blobs::Stub> blobs;
-  std::unique_ptr<v1::ServerInfo::Stub> server_info;
 };
 
 }  // namespace tessera
