@@ -7,18 +7,23 @@
 namespace tessera {
 namespace {
 
-// Rolls back unless committed; SQLite itself rolls back after some errors (disk full).
+// Ends a transaction that was not committed, after an exception too; SQLite itself rolls back after some
+// errors (disk full).
+struct Rollback {
+  Database& db;
+  ~Rollback() {
+    if (db.in_transaction()) {
+      db.RunScript("ROLLBACK").IgnoreError();
+    }
+  }
+};
+
 absl::Status InTransaction(Database& db, const char* begin,
                            const std::function<absl::Status(Database&)>& body) {
   TESSERA_RETURN_IF_ERROR(db.RunScript(begin));
-  absl::Status status = body(db);
-  if (status.ok()) {
-    status = db.RunScript("COMMIT");
-  }
-  if (!status.ok() && db.in_transaction()) {
-    db.RunScript("ROLLBACK").IgnoreError();
-  }
-  return status;
+  const Rollback rollback{db};
+  TESSERA_RETURN_IF_ERROR(body(db));
+  return db.RunScript("COMMIT");
 }
 
 }  // namespace

@@ -11,6 +11,13 @@ constexpr std::chrono::milliseconds kTellInterval{100};
 }  // namespace
 
 void JobEvents::Tell(int64_t id, const v1::Job& job, uint64_t sequence) const {
+  v1::JobEvent event;
+  event.set_sequence(sequence);
+  *event.mutable_job() = job;
+  Tell(id, event);
+}
+
+void JobEvents::Tell(int64_t id, const absl::StatusOr<v1::JobEvent>& event) const {
   std::vector<std::shared_ptr<const Watcher>> watchers;
   {
     const std::lock_guard lock(mutex_);
@@ -20,9 +27,6 @@ void JobEvents::Tell(int64_t id, const v1::Job& job, uint64_t sequence) const {
       }
     }
   }
-  v1::JobEvent event;
-  event.set_sequence(sequence);
-  *event.mutable_job() = job;
   for (const auto& watcher : watchers) {
     (*watcher)(event);
   }
@@ -84,6 +88,14 @@ void JobEvents::EndRun(const JobRecord& record) {
     }
   }
   Tell(record.id, job, record.sequence);
+}
+
+void JobEvents::LoseRun(int64_t id, const absl::Status& error) {
+  {
+    const std::lock_guard lock(mutex_);
+    runs_.erase(id);
+  }
+  Tell(id, error);
 }
 
 void JobEvents::Publish(const JobRecord& record) {

@@ -11,6 +11,9 @@
 #include <memory>
 #include <mutex>
 
+#include <absl/status/status.h>
+#include <absl/status/statusor.h>
+
 #include "btf/base/run_context.h"
 #include "server/catalog/job_table.h"
 #include "tessera/v1/tessera.pb.h"
@@ -21,8 +24,8 @@ namespace tessera {
 class JobEvents {
  public:
   // Called from any thread, by two at once too, so that events may come out of order; perhaps once more after
-  // Unwatch. Must be quick.
-  using Watcher = std::function<void(const v1::JobEvent&)>;
+  // Unwatch. Must be quick. An error means that nothing more will be told of this run.
+  using Watcher = std::function<void(const absl::StatusOr<v1::JobEvent>&)>;
 
   // A run begins with this record, RUNNING.
   void BeginRun(const JobRecord& record);
@@ -33,6 +36,8 @@ class JobEvents {
   [[nodiscard]] uint64_t NextSequence(int64_t id);
   // The run has ended with this record, as the catalog has it.
   void EndRun(const JobRecord& record);
+  // The run has ended and nobody can tell how: watchers get `error`.
+  void LoseRun(int64_t id, const absl::Status& error);
   // Any other change.
   void Publish(const JobRecord& record);
 
@@ -56,6 +61,7 @@ class JobEvents {
     std::shared_ptr<const Watcher> watcher;
   };
   void Tell(int64_t id, const v1::Job& job, uint64_t sequence) const;
+  void Tell(int64_t id, const absl::StatusOr<v1::JobEvent>& event) const;
 
   mutable std::mutex mutex_;  // guards what follows
   std::map<int64_t, Run> runs_;

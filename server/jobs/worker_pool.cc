@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <exception>
+#include <functional>
 #include <new>
 #include <span>
 
@@ -53,11 +54,10 @@ class StoreReader : public BlobReader {
   BlobStore& store_;
 };
 
-// Libraries below a job may throw (allocation above all): no exception may end the server.
-absl::StatusOr<JobOutput> RunGuarded(const JobFunction& function, const JobInput& input,
-                                     const JobContext& context) {
+// Libraries below a job, and allocation in our own part of it, may throw: no exception may end the server.
+absl::Status Guarded(const std::function<absl::Status()>& work) {
   try {
-    return function(input, context);
+    return work();
   } catch (const std::bad_alloc&) {
     return absl::ResourceExhaustedError("the job needs more memory than the server has");
   } catch (const std::exception& error) {
@@ -90,14 +90,8 @@ absl::StatusOr<int> WorkerPool::KindVersion(const std::string& kind) const {
 }
 
 absl::Status WorkerPool::Start(int num_workers) {
-  TESSERA_RETURN_IF_ERROR(connections_.Write([&](Database& db) -> absl::Status {
-    // The data folder has one server at a time, so whatever runs belongs to a dead one.
-    TESSERA_ASSIGN_OR_RETURN(const std::vector<int64_t> ids, RecoverJobs(db, INT64_MAX, clock_()));
-    for (const int64_t id : ids) {
-      logger_->warn("{} was interrupted and taken from its dead worker", JobName(id));
-    }
-    return absl::OkStatus();
-  }));
+  // The data folder has one server at a time, so whatever runs belongs to a dead one.
+  TESSERA_RETURN_IF_ERROR(TakeLostJobs(INT64_MAX));
   for (int i = 0; i < std::max(1, num_workers); ++i) {
     workers_.emplace_back([this] { WorkerLoop(); });
   }
@@ -159,13 +153,17 @@ void WorkerPool::WorkerLoop() {
       }
       wakes = wakes_;
     }
-    const absl::StatusOr<std::optional<JobRecord>> claimed = Claim();
-    if (claimed.ok() && claimed->has_value()) {
-      Run(**claimed);
+    std::optional<JobRecord> claimed;
+    const absl::Status status = Guarded([&]() -> absl::Status {
+      TESSERA_ASSIGN_OR_RETURN(claimed, Claim());
+      return absl::OkStatus();
+    });
+    if (claimed) {
+      Run(*claimed);
       continue;
     }
-    if (!claimed.ok()) {
-      logger_->error("cannot claim a job: {}", claimed.status().ToString());
+    if (!status.ok()) {
+      logger_->error("cannot claim a job: {}", status.ToString());
     }
     std::unique_lock lock(mutex_);
     changed_.wait_for(lock, std::chrono::seconds(1), [&] { return stopping_ || wakes_ != wakes; });
@@ -222,7 +220,7 @@ void WorkerPool::Run(const JobRecord& record) {
   events_.BeginRun(record);
   logger_->info("{} ({}, for {}) begins, attempt {}", record.job.name(), record.job.kind(),
                 record.job.result_name(), record.job.attempt());
-  const absl::Status status = Execute(record, stop);
+  const absl::Status status = Guarded([&] { return Execute(record, stop); });
   if (status.ok()) {
     logger_->info("{} succeeded", record.job.name());
     TellEnd(record.id);
@@ -256,8 +254,7 @@ absl::Status WorkerPool::Execute(const JobRecord& record, const std::stop_token&
   context.blobs = &reader;
   context.scratch_folder = scratch->folder();
   TESSERA_RETURN_IF_ERROR(context.run.CheckStop());
-  TESSERA_ASSIGN_OR_RETURN(const JobOutput output,
-                           RunGuarded(kind->run, {record.params, record.inputs}, context));
+  TESSERA_ASSIGN_OR_RETURN(const JobOutput output, kind->run({record.params, record.inputs}, context));
   return Commit(record, output);
 }
 
@@ -349,6 +346,8 @@ void WorkerPool::TellEnd(int64_t id) {
   });
   if (!status.ok()) {
     logger_->error("cannot read {}: {}", JobName(id), status.ToString());
+    events_.LoseRun(id, absl::UnavailableError(
+                            absl::StrCat("the server cannot tell how ", JobName(id), " ended, ask again")));
   }
 }
 
@@ -360,7 +359,14 @@ void WorkerPool::MaintenanceLoop(const std::stop_token& stop) {
     const auto now = std::chrono::steady_clock::now();
     if (now - heartbeat >= kHeartbeatInterval) {
       heartbeat = now;
-      ExtendLeases();
+      // A job whose end could not be recorded is held by nobody: it runs again once its lease is over.
+      absl::Status status = ExtendLeases();
+      if (status.ok()) {
+        status = TakeLostJobs(clock_());
+      }
+      if (!status.ok()) {
+        logger_->error("cannot look after the leases: {}", status.ToString());
+      }
     }
     if (now - garbage >= kGarbageInterval) {
       garbage = now;
@@ -370,7 +376,28 @@ void WorkerPool::MaintenanceLoop(const std::stop_token& stop) {
   }
 }
 
-void WorkerPool::ExtendLeases() {
+absl::Status WorkerPool::TakeLostJobs(int64_t lease_before_ms) {
+  std::vector<JobRecord> records;
+  TESSERA_RETURN_IF_ERROR(connections_.Write([&](Database& db) -> absl::Status {
+    TESSERA_ASSIGN_OR_RETURN(const std::vector<int64_t> ids, RecoverJobs(db, lease_before_ms, clock_()));
+    for (const int64_t id : ids) {
+      TESSERA_ASSIGN_OR_RETURN(JobRecord record, FindJob(db, id));
+      records.push_back(std::move(record));
+    }
+    return absl::OkStatus();
+  }));
+  for (const JobRecord& record : records) {
+    logger_->warn("{} was interrupted and taken from its dead worker", record.job.name());
+    events_.Publish(record);
+  }
+  if (!records.empty()) {
+    Wake();
+  }
+  return absl::OkStatus();
+}
+
+absl::Status WorkerPool::ExtendLeases() {
+  absl::Status failure;
   std::vector<std::pair<int64_t, std::string>> held;
   {
     const std::lock_guard lock(mutex_);
@@ -388,9 +415,10 @@ void WorkerPool::ExtendLeases() {
         it->second.stop.request_stop();
       }
     } else if (!status.ok()) {
-      logger_->error("cannot extend the lease of {}: {}", JobName(id), status.ToString());
+      failure = status;
     }
   }
+  return failure;
 }
 
 void WorkerPool::EndOverdueCancels() {

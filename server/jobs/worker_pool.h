@@ -62,7 +62,9 @@ class WorkerPool {
 
   void WorkerLoop();
   void MaintenanceLoop(const std::stop_token& stop);
-  void ExtendLeases();
+  // OK when every running job is held for another kLeaseMs, or known to be lost.
+  [[nodiscard]] absl::Status ExtendLeases();
+  [[nodiscard]] absl::Status TakeLostJobs(int64_t lease_before_ms);
   void EndOverdueCancels();
   void CollectGarbage();
   [[nodiscard]] absl::StatusOr<std::optional<JobRecord>> Claim();

@@ -233,6 +233,7 @@ class WatchReactor final : public grpc::ServerWriteReactor<v1::JobEvent>,
   // Starts the next write, or ends the stream after the last.
   void Advance() {
     bool write = false;
+    absl::Status end;
     {
       const std::lock_guard lock(mutex_);
       if (writing_ || finished_ || watch_ == nullptr) {
@@ -244,11 +245,12 @@ class WatchReactor final : public grpc::ServerWriteReactor<v1::JobEvent>,
       }
       write = writing_ = news.has_event;
       event_ = std::move(news.event);
+      end = std::move(news.error);
     }
     if (write) {
       StartWrite(&event_);
     } else {
-      FinishOnce(grpc::Status::OK);
+      FinishOnce(GrpcFromStatus(end));
     }
   }
   void FinishOnce(const grpc::Status& status) {
@@ -320,11 +322,16 @@ class WaitReactor final : public grpc::ServerUnaryReactor, public std::enable_sh
   }
   void EndIfFinal() {
     const std::shared_ptr<JobWatch> watch = Watch();
-    if (watch != nullptr && IsFinal(watch->Latest().job().state())) {
+    if (watch == nullptr) {
+      return;
+    }
+    const absl::StatusOr<v1::JobEvent> latest = watch->Latest();
+    if (!latest.ok() || IsFinal(latest->job().state())) {
       End(grpc::Status::OK, watch);
     }
   }
-  void End(const grpc::Status& status, const std::shared_ptr<JobWatch>& watch) {
+  // With a watch, answers what it knows.
+  void End(grpc::Status status, const std::shared_ptr<JobWatch>& watch) {
     {
       const std::lock_guard lock(mutex_);
       if (std::exchange(finished_, true)) {
@@ -332,7 +339,12 @@ class WaitReactor final : public grpc::ServerUnaryReactor, public std::enable_sh
       }
     }
     if (watch != nullptr) {
-      *response_ = watch->Latest().job();
+      absl::StatusOr<v1::JobEvent> latest = watch->Latest();
+      if (latest.ok()) {
+        *response_ = std::move(*latest->mutable_job());
+      } else {
+        status = GrpcFromStatus(latest.status());
+      }
     }
     Finish(status);
   }

@@ -33,13 +33,13 @@ absl::StatusOr<std::shared_ptr<JobWatch>> JobWatch::Begin(const Backend& backend
   }
   std::shared_ptr<JobWatch> watch(new JobWatch(backend, after_sequence));
   // First the watch, then the state: no event between the two is lost.
-  watch->watch_ = backend.events.Watch(
-      id, [weak = std::weak_ptr<JobWatch>(watch), ready = std::move(ready)](const v1::JobEvent& event) {
-        if (const auto alive = weak.lock()) {
-          alive->OnEvent(event);
-          ready();
-        }
-      });
+  watch->watch_ = backend.events.Watch(id, [weak = std::weak_ptr<JobWatch>(watch), ready = std::move(ready)](
+                                               const absl::StatusOr<v1::JobEvent>& event) {
+    if (const auto alive = weak.lock()) {
+      alive->OnEvent(event);
+      ready();
+    }
+  });
   TESSERA_ASSIGN_OR_RETURN(const v1::JobEvent current, CurrentEvent(backend, id));
   if (after_sequence > current.sequence()) {
     // A number this server never told (another data folder): start anew rather than stay silent.
@@ -54,10 +54,12 @@ JobWatch::~JobWatch() {
   backend_.events.Unwatch(watch_);
 }
 
-void JobWatch::OnEvent(const v1::JobEvent& event) {
+void JobWatch::OnEvent(const absl::StatusOr<v1::JobEvent>& event) {
   const std::lock_guard lock(mutex_);
-  if (event.sequence() > latest_.sequence()) {
-    latest_ = event;
+  if (!event.ok()) {
+    error_ = event.status();
+  } else if (event->sequence() > latest_.sequence()) {
+    latest_ = *event;
   }
 }
 
@@ -70,11 +72,18 @@ JobWatch::News JobWatch::Next() {
     told_sequence_ = latest_.sequence();
   }
   news.ended = IsFinal(latest_.job().state());
+  if (!news.ended && !error_.ok()) {
+    news.ended = true;
+    news.error = error_;
+  }
   return news;
 }
 
-v1::JobEvent JobWatch::Latest() {
+absl::StatusOr<v1::JobEvent> JobWatch::Latest() {
   const std::lock_guard lock(mutex_);
+  if (!error_.ok() && !IsFinal(latest_.job().state())) {
+    return error_;
+  }
   return latest_;
 }
 

@@ -32,20 +32,22 @@ class JobWatch {
     bool has_event = false;
     v1::JobEvent event;
     bool ended = false;  // after `event`, nothing will come
+    absl::Status error;  // why nothing will come though the job has not ended
   };
   [[nodiscard]] News Next();
-  // The newest event, taken or not.
-  [[nodiscard]] v1::JobEvent Latest();
+  // The newest event, taken or not; an error when nothing more will come though the job has not ended.
+  [[nodiscard]] absl::StatusOr<v1::JobEvent> Latest();
 
  private:
   JobWatch(const Backend& backend, uint64_t after_sequence)
       : backend_(backend), told_sequence_(after_sequence) {}
-  void OnEvent(const v1::JobEvent& event);
+  void OnEvent(const absl::StatusOr<v1::JobEvent>& event);
 
   const Backend& backend_;
   uint64_t watch_ = 0;
   std::mutex mutex_;  // guards what follows
   v1::JobEvent latest_;
+  absl::Status error_;
   uint64_t told_sequence_ = 0;
 };
 

@@ -45,6 +45,18 @@ absl::StatusOr<JobOutput> RunTestJob(const JobInput& input, const JobContext& co
     return WithReason(absl::FailedPreconditionError("anisotropy 0.7, at most 0.3"), "NOT_ISOTROPIC",
                       "materials/x");
   }
+  if (input.params.starts_with("broken")) {
+    // A result that throws when it is committed: the variant lost its value.
+    struct Thrower {
+      operator v1::Material() const { throw std::bad_alloc(); }
+    };
+    JobOutput output = OutputOf(input.params);
+    try {
+      output.resource.emplace<v1::Material>(Thrower());
+    } catch (const std::bad_alloc&) {
+    }
+    return output;
+  }
   if (input.params.starts_with("throw")) {
     throw std::bad_alloc();
   }
@@ -59,11 +71,18 @@ class WorkerPoolTest : public testing::Test {
         std::vector<JobKind>{{"test", 1,
                               [this](const JobInput& input, const JobContext& context) {
                                 ++num_runs_;
+                                if (input.params == "vanish") {
+                                  EXPECT_TRUE(DeleteJobs().ok());
+                                }
                                 return RunTestJob(input, context);
                               }}},
         [this] { return catalog_.now_ms; },
         std::make_shared<spdlog::logger>("test", std::make_shared<spdlog::sinks::null_sink_mt>()));
     ASSERT_TRUE(pool_->Start(num_workers).ok());
+  }
+  // A catalog that cannot tell any more what became of a job.
+  absl::Status DeleteJobs() {
+    return catalog_.connections->Write([](Database& db) { return db.RunScript("DELETE FROM jobs"); });
   }
   int64_t Insert(const std::string& name, const std::string& params, const std::string& kind = "test") {
     const auto record = catalog_.Write<JobRecord>([&](Database& db) {
@@ -137,6 +156,49 @@ TEST_F(WorkerPoolTest, FailuresKeepTheirReason) {
   EXPECT_EQ(WaitForEnd(Insert("materials/c", "x", "unknown")).error().code(),
             static_cast<int>(absl::StatusCode::kUnimplemented));
   EXPECT_FALSE(Material("a").ok());
+}
+
+TEST_F(WorkerPoolTest, AResultThatCannotBeCommittedFailsItsJobOnly) {
+  StartPool(1);
+  const v1::Job broken = WaitForEnd(Insert("materials/a", "broken"));
+  EXPECT_EQ(broken.state(), v1::Job::FAILED);
+  EXPECT_EQ(broken.error().code(), static_cast<int>(absl::StatusCode::kInternal));
+  EXPECT_EQ(WaitForEnd(Insert("materials/b", "good")).state(), v1::Job::SUCCEEDED);
+}
+
+TEST_F(WorkerPoolTest, WatchersAreToldWhenNobodyKnowsHowAJobEnded) {
+  std::mutex mutex;
+  std::condition_variable told;
+  absl::Status error;
+  const int64_t id = Insert("materials/a", "vanish");
+  const uint64_t watch = events_.Watch(id, [&](const absl::StatusOr<v1::JobEvent>& event) {
+    const std::lock_guard lock(mutex);
+    error.Update(event.status());
+    told.notify_all();
+  });
+  StartPool(1);
+  {
+    std::unique_lock lock(mutex);
+    EXPECT_TRUE(told.wait_for(lock, kPatience, [&] { return !error.ok(); }));
+    EXPECT_TRUE(absl::IsUnavailable(error)) << error;
+  }
+  events_.Unwatch(watch);
+}
+
+TEST_F(WorkerPoolTest, AJobThatNobodyHoldsRunsAgainAfterItsLease) {
+  StartPool(1);
+  const int64_t running = Insert("materials/x", "sleep");
+  WaitForRun(running);
+  const int64_t id = Insert("materials/a", "good");  // waits for the only worker
+  ASSERT_TRUE(catalog_
+                  .Write<std::optional<JobRecord>>([&](Database& db) {
+                    return ClaimJob(db, "lease of a worker that could not record the end",
+                                    catalog_.now_ms - 1, catalog_.now_ms);
+                  })
+                  .ok());
+  ASSERT_TRUE(pool_->Cancel(running).ok());
+  EXPECT_EQ(WaitForEnd(id).state(), v1::Job::SUCCEEDED);
+  EXPECT_EQ(WaitForEnd(running).state(), v1::Job::CANCELLED);
 }
 
 TEST_F(WorkerPoolTest, ARunningJobIsCancelledWithinASecond) {
@@ -236,9 +298,10 @@ TEST_F(WorkerPoolTest, EventsGrowAndEndWithTheJob) {
   std::condition_variable ended;
   std::vector<v1::JobEvent> seen;
   const int64_t id = Insert("materials/wool", "sleep");
-  const uint64_t watch = events_.Watch(id, [&](const v1::JobEvent& event) {
+  const uint64_t watch = events_.Watch(id, [&](const absl::StatusOr<v1::JobEvent>& event) {
     const std::lock_guard lock(mutex);
-    seen.push_back(event);
+    ASSERT_TRUE(event.ok()) << event.status();
+    seen.push_back(*event);
     ended.notify_all();
   });
   StartPool(1);

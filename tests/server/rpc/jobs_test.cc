@@ -6,6 +6,7 @@
 
 #include <gtest/gtest.h>
 
+#include "server/catalog/sqlite.h"
 #include "tests/server/support/server_fixture.h"
 
 namespace tessera {
@@ -105,6 +106,30 @@ TEST_F(ServerTest, ACancelEndsAJobWithinASecond) {
   EXPECT_EQ(stubs_->Wait(job->name())->state(), v1::Job::CANCELLED);
   EXPECT_LT(steady_clock::now() - start, kCancelLimit);
   EXPECT_EQ(stubs_->Cancel(job->name())->state(), v1::Job::CANCELLED);
+}
+
+// Whoever waits learns that the catalog cannot tell the end, instead of waiting for ever.
+TEST_F(ServerTest, WatchesAndWaitsEndWhenTheJobIsLost) {
+  const auto job = stubs_->Generate(Stubs::SmallMaterial("a", 2));
+  WaitForRun(job->name());
+  grpc::ClientContext context;
+  v1::WatchJobRequest request;
+  request.set_name(job->name());
+  auto reader = stubs_->jobs->WatchJob(&context, request);
+  v1::JobEvent event;
+  ASSERT_TRUE(reader->Read(&event));
+  std::jthread waiter(
+      [&] { EXPECT_EQ(stubs_->Wait(job->name()).status().code(), absl::StatusCode::kUnavailable); });
+  std::this_thread::sleep_for(milliseconds(100));  // the wait has begun
+  {
+    auto catalog = Database::Open(folder_.path() / "catalog.sqlite", OpenMode::kReadWrite);
+    ASSERT_TRUE(catalog.ok()) << catalog.status();
+    ASSERT_TRUE(catalog->RunScript("DELETE FROM jobs").ok());
+  }
+  // The heartbeat finds the lease gone and stops the run.
+  while (reader->Read(&event)) {
+  }
+  EXPECT_EQ(StatusFromGrpc(reader->Finish()).code(), absl::StatusCode::kUnavailable);
 }
 
 }  // namespace
