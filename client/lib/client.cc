@@ -111,15 +111,17 @@ absl::StatusOr<v1::Material> Client::CreateMaterial(v1::CreateMaterialRequest re
 
 absl::StatusOr<v1::Job> Client::ImportMaterial(v1::ImportMaterialRequest request, const RunContext& context) {
   FillRequestId(request);
-  return CallUnary(*stubs_->materials, &v1::Materials::Stub::ImportMaterial, request, options_.retry,
-                   context);
+  return Asked(
+      CallUnary(*stubs_->materials, &v1::Materials::Stub::ImportMaterial, request, options_.retry, context),
+      request.request_id());
 }
 
 absl::StatusOr<v1::Job> Client::GenerateMaterial(v1::GenerateMaterialRequest request,
                                                  const RunContext& context) {
   FillRequestId(request);
-  return CallUnary(*stubs_->materials, &v1::Materials::Stub::GenerateMaterial, request, options_.retry,
-                   context);
+  return Asked(
+      CallUnary(*stubs_->materials, &v1::Materials::Stub::GenerateMaterial, request, options_.retry, context),
+      request.request_id());
 }
 
 absl::StatusOr<v1::Material> Client::GetMaterial(std::string_view name, const RunContext& context) {
@@ -163,8 +165,9 @@ absl::StatusOr<std::vector<v1::Arrangement>> Client::ListArrangements(const RunC
 absl::StatusOr<v1::Job> Client::SynthesizeTileSet(v1::SynthesizeTileSetRequest request,
                                                   const RunContext& context) {
   FillRequestId(request);
-  return CallUnary(*stubs_->tile_sets, &v1::TileSets::Stub::SynthesizeTileSet, request, options_.retry,
-                   context);
+  return Asked(
+      CallUnary(*stubs_->tile_sets, &v1::TileSets::Stub::SynthesizeTileSet, request, options_.retry, context),
+      request.request_id());
 }
 
 absl::StatusOr<v1::TileSet> Client::CreateTileSet(v1::CreateTileSetRequest request,

@@ -17,7 +17,9 @@
 #include <cstdint>
 #include <filesystem>
 #include <functional>
+#include <map>
 #include <memory>
+#include <mutex>
 #include <span>
 #include <string>
 #include <string_view>
@@ -108,6 +110,7 @@ class Client {
   // Jobs.
   [[nodiscard]] absl::StatusOr<v1::Job> GetJob(std::string_view name, const RunContext& context = {});
   [[nodiscard]] absl::StatusOr<std::vector<v1::Job>> ListJobs(const RunContext& context = {});
+  // Ends the job for everyone who asked for it.
   [[nodiscard]] absl::StatusOr<v1::Job> CancelJob(std::string_view name, const RunContext& context = {});
   // Calls `on_event` for every event after `after_sequence`, each once and in order, and returns the job in
   // its final state, whatever that is. A lost connection is taken up again after the last event seen.
@@ -116,7 +119,7 @@ class Client {
                                                  const RunContext& context = {});
   // Watches until the job ends, its progress reported through context.progress. Returns the job if it
   // SUCCEEDED, else JobFailure(job). After a stop request returns CANCELLED and, with kCancelJob, has
-  // cancelled the job.
+  // cancelled the job; one that this client asked for goes on while another client waits for the same work.
   [[nodiscard]] absl::StatusOr<v1::Job> WaitForJob(std::string_view name, OnStop on_stop,
                                                    const RunContext& context = {});
 
@@ -155,9 +158,15 @@ class Client {
  private:
   struct Stubs;
   Client(ClientOptions options, std::unique_ptr<Stubs> stubs);
+  // Notes that the call of this request_id was answered with `job`.
+  absl::StatusOr<v1::Job> Asked(absl::StatusOr<v1::Job> job, const std::string& request_id);
+  // One noted request_id of the job, taken from the notes; empty when there is none.
+  std::string TakeRequestId(std::string_view job_name);
 
   ClientOptions options_;
   std::unique_ptr<Stubs> stubs_;
+  std::mutex asked_mutex_;
+  std::multimap<std::string, std::string, std::less<>> asked_;  // job -> request_id; guarded by asked_mutex_
 };
 
 // The error of a job that ended FAILED or CANCELLED, its ErrorDetail as payload; OK for any other state.

@@ -109,13 +109,33 @@ absl::StatusOr<v1::Job> Client::WaitForJob(std::string_view name, OnStop on_stop
       context);
   if (!job.ok()) {
     if (context.stop.stop_requested() && on_stop == OnStop::kCancelJob) {
+      v1::CancelJobRequest request;
+      request.set_name(std::string(name));
+      request.set_withdrawn_request_id(TakeRequestId(name));
       // The caller's stop must not stop this call, too.
-      TESSERA_RETURN_IF_ERROR(CancelJob(name).status());
+      TESSERA_RETURN_IF_ERROR(
+          CallUnary(*stubs_->jobs, &v1::Jobs::Stub::CancelJob, request, options_.retry, RunContext())
+              .status());
     }
     return job.status();
   }
+  TakeRequestId(name);
   TESSERA_RETURN_IF_ERROR(JobFailure(*job));
   return *job;
+}
+
+absl::StatusOr<v1::Job> Client::Asked(absl::StatusOr<v1::Job> job, const std::string& request_id) {
+  if (job.ok()) {
+    const std::lock_guard lock(asked_mutex_);
+    asked_.emplace(job->name(), request_id);
+  }
+  return job;
+}
+
+std::string Client::TakeRequestId(std::string_view job_name) {
+  const std::lock_guard lock(asked_mutex_);
+  const auto it = asked_.find(job_name);
+  return it == asked_.end() ? std::string() : asked_.extract(it).mapped();
 }
 
 absl::Status JobFailure(const v1::Job& job) {

@@ -94,8 +94,15 @@ absl::Status CheckHeld(Database& db, int64_t id, const absl::Status& status) {
   return db.changes() == 1 ? absl::OkStatus() : LeaseLost(id);
 }
 
-absl::Status DropInputs(Database& db, int64_t id) {
+// What only a job that has not ended needs.
+absl::Status DropNeeds(Database& db, int64_t id) {
+  TESSERA_RETURN_IF_ERROR(db.Run("DELETE FROM job_requesters WHERE job_id = ?", id));
   return db.Run("DELETE FROM job_inputs WHERE job_id = ?", id);
+}
+
+absl::Status AddRequester(Database& db, int64_t id, const std::string& request_id) {
+  return db.Run("INSERT INTO job_requesters (job_id, request_id) VALUES (?, ?) ON CONFLICT DO NOTHING", id,
+                request_id);
 }
 
 }  // namespace
@@ -114,6 +121,7 @@ absl::StatusOr<JobRecord> InsertJob(Database& db, const NewJob& job, int64_t now
                  job.result_name, dedupe));
     TESSERA_ASSIGN_OR_RETURN(const bool active, rows.Step());
     if (active && rows.Text(1) == dedupe) {
+      TESSERA_RETURN_IF_ERROR(AddRequester(db, rows.Int(0), job.request_id));
       return FindJob(db, rows.Int(0));
     }
     if (active && job.on_taken == OnTaken::kRefuse) {
@@ -145,6 +153,7 @@ absl::StatusOr<JobRecord> InsertJob(Database& db, const NewJob& job, int64_t now
     TESSERA_RETURN_IF_ERROR(db.Run("INSERT INTO job_inputs (job_id, place, sha256) VALUES (?, ?, ?)", id,
                                    place, job.inputs[place]));
   }
+  TESSERA_RETURN_IF_ERROR(AddRequester(db, id, job.request_id));
   return FindJob(db, id);
 }
 
@@ -242,7 +251,7 @@ absl::Status FinishJob(Database& db, int64_t id, const std::string& lease_token,
                        "= ?, end_ms = ?,"
                        " lease_token = NULL, lease_until_ms = NULL WHERE id = ? AND lease_token = ?",
                        sequence, work.blob_sha256, BlobBytes{work.message}, now_ms, id, lease_token)));
-  return DropInputs(db, id);
+  return DropNeeds(db, id);
 }
 
 absl::Status FailJob(Database& db, int64_t id, const std::string& lease_token, uint64_t sequence,
@@ -255,7 +264,7 @@ absl::Status FailJob(Database& db, int64_t id, const std::string& lease_token, u
                        " WHERE id = ? AND lease_token = ?",
                        sequence, static_cast<int>(error.code()), std::string(error.message()),
                        ReasonOf(error), SubjectOf(error), now_ms, id, lease_token)));
-  return DropInputs(db, id);
+  return DropNeeds(db, id);
 }
 
 absl::Status EndCancelledJob(Database& db, int64_t id, const std::string& lease_token, uint64_t sequence,
@@ -265,7 +274,7 @@ absl::Status EndCancelledJob(Database& db, int64_t id, const std::string& lease_
                                            "lease_token = NULL, lease_until_ms = NULL"
                                            " WHERE id = ? AND lease_token = ?",
                                            sequence, now_ms, id, lease_token)));
-  return DropInputs(db, id);
+  return DropNeeds(db, id);
 }
 
 absl::Status PutBackJob(Database& db, int64_t id, const std::string& lease_token, uint64_t sequence,
@@ -279,7 +288,18 @@ absl::Status PutBackJob(Database& db, int64_t id, const std::string& lease_token
           now_ms, sequence, id, lease_token));
 }
 
-absl::StatusOr<JobRecord> RequestCancel(Database& db, int64_t id, int64_t now_ms) {
+absl::StatusOr<JobRecord> RequestCancel(Database& db, int64_t id, const std::string& withdrawn_request_id,
+                                        int64_t now_ms) {
+  if (!withdrawn_request_id.empty()) {
+    TESSERA_RETURN_IF_ERROR(
+        db.Run("DELETE FROM job_requesters WHERE job_id = ? AND request_id = ?", id, withdrawn_request_id));
+    TESSERA_ASSIGN_OR_RETURN(Statement others,
+                             db.Query("SELECT 1 FROM job_requesters WHERE job_id = ? LIMIT 1", id));
+    TESSERA_ASSIGN_OR_RETURN(const bool wanted, others.Step());
+    if (wanted) {
+      return FindJob(db, id);
+    }
+  }
   TESSERA_RETURN_IF_ERROR(
       db.Run("UPDATE jobs SET cancel_requested = 1,"
              " sequence = iif(state = 'QUEUED', sequence + 1, sequence),"
@@ -288,7 +308,7 @@ absl::StatusOr<JobRecord> RequestCancel(Database& db, int64_t id, int64_t now_ms
              now_ms, id));
   TESSERA_ASSIGN_OR_RETURN(JobRecord record, FindJob(db, id));
   if (IsFinal(record.job.state())) {
-    TESSERA_RETURN_IF_ERROR(DropInputs(db, id));
+    TESSERA_RETURN_IF_ERROR(DropNeeds(db, id));
   }
   return record;
 }
@@ -316,9 +336,12 @@ absl::StatusOr<std::vector<int64_t>> RecoverJobs(Database& db, int64_t lease_bef
     }
     ids.push_back(rows.Int(0));
   }
-  TESSERA_RETURN_IF_ERROR(
-      db.Run("DELETE FROM job_inputs WHERE job_id IN"
-             " (SELECT id FROM jobs WHERE state IN ('SUCCEEDED', 'FAILED', 'CANCELLED'))"));
+  for (const char* table : {"job_inputs", "job_requesters"}) {
+    TESSERA_RETURN_IF_ERROR(
+        db.Run(absl::StrCat("DELETE FROM ", table,
+                            " WHERE job_id IN"
+                            " (SELECT id FROM jobs WHERE state IN ('SUCCEEDED', 'FAILED', 'CANCELLED'))")));
+  }
   return ids;
 }
 

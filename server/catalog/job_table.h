@@ -31,6 +31,7 @@ struct NewJob {
   std::vector<std::string> inputs;  // SHA-256 of blobs
   std::string result_name;          // full name of what it makes
   OnTaken on_taken = OnTaken::kRefuse;
+  std::string request_id;  // of the call that asks for it, may be empty
 };
 
 struct JobRecord {
@@ -86,8 +87,11 @@ struct FinishedWork {
 [[nodiscard]] absl::Status PutBackJob(Database& db, int64_t id, const std::string& lease_token,
                                       uint64_t sequence, int64_t now_ms);
 
-// Ends a queued job, marks a running one, leaves one that has ended. Errors: NOT_FOUND.
-[[nodiscard]] absl::StatusOr<JobRecord> RequestCancel(Database& db, int64_t id, int64_t now_ms);
+// Ends a queued job, marks a running one, leaves one that has ended. With a request_id, takes back that call
+// only and leaves a job that other calls still ask for. Errors: NOT_FOUND.
+[[nodiscard]] absl::StatusOr<JobRecord> RequestCancel(Database& db, int64_t id,
+                                                      const std::string& withdrawn_request_id,
+                                                      int64_t now_ms);
 
 // Takes RUNNING jobs whose lease ended before `lease_before_ms` from their dead workers: CANCELLED when that
 // was asked for, FAILED (CRASHED) after kMaxAttempts, else QUEUED. Returns their ids. The largest time means

@@ -125,12 +125,15 @@ void WorkerPool::Wake() {
   changed_.notify_all();
 }
 
-absl::StatusOr<JobRecord> WorkerPool::Cancel(int64_t id) {
+absl::StatusOr<JobRecord> WorkerPool::Cancel(int64_t id, const std::string& withdrawn_request_id) {
   JobRecord record;
   TESSERA_RETURN_IF_ERROR(connections_.Write([&](Database& db) -> absl::Status {
-    TESSERA_ASSIGN_OR_RETURN(record, RequestCancel(db, id, clock_()));
+    TESSERA_ASSIGN_OR_RETURN(record, RequestCancel(db, id, withdrawn_request_id, clock_()));
     return absl::OkStatus();
   }));
+  if (!record.cancel_requested) {
+    return record;
+  }
   if (record.job.state() == v1::Job::CANCELLED) {
     events_.Publish(record);
   }

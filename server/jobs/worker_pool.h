@@ -48,8 +48,9 @@ class WorkerPool {
   // A queued job may be there.
   void Wake();
   // Ends a queued job at once. A running one is asked to stop; if it has not after 800 ms it is CANCELLED all
-  // the same and whatever it still makes is thrown away. Errors: NOT_FOUND.
-  [[nodiscard]] absl::StatusOr<JobRecord> Cancel(int64_t id);
+  // the same and whatever it still makes is thrown away. With a request_id, only takes back that call: the
+  // job goes on while others want it. Errors: NOT_FOUND.
+  [[nodiscard]] absl::StatusOr<JobRecord> Cancel(int64_t id, const std::string& withdrawn_request_id = "");
 
  private:
   using SteadyTime = std::chrono::steady_clock::time_point;

@@ -100,7 +100,9 @@ absl::StatusOr<v1::Job> QueueJob(const Backend& backend, const std::string& meth
   v1::Job response;
   TESSERA_RETURN_IF_ERROR(
       Mutate(backend, method, request_id, request, response, [&](Database& db) -> absl::Status {
-        TESSERA_ASSIGN_OR_RETURN(JobRecord record, InsertJob(db, job, backend.clock()));
+        NewJob asked = job;
+        asked.request_id = request_id;
+        TESSERA_ASSIGN_OR_RETURN(JobRecord record, InsertJob(db, asked, backend.clock()));
         response = std::move(record.job);
         return absl::OkStatus();
       }));

@@ -105,7 +105,7 @@ absl::StatusOr<v1::ListJobsResponse> JobsService::ListJobs(const v1::ListJobsReq
 
 absl::StatusOr<v1::Job> JobsService::CancelJob(const v1::CancelJobRequest& request) const {
   TESSERA_ASSIGN_OR_RETURN(const int64_t id, ParseJobName(request.name()));
-  TESSERA_ASSIGN_OR_RETURN(const JobRecord record, backend_.pool.Cancel(id));
+  TESSERA_ASSIGN_OR_RETURN(const JobRecord record, backend_.pool.Cancel(id, request.withdrawn_request_id()));
   return backend_.events.EventOf(record).job();
 }
 

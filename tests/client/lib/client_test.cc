@@ -275,5 +275,20 @@ TEST_F(ClientTest, StopCancelsTheJobOnlyWhenAsked) {
   }
 }
 
+TEST_F(ClientTest, StopWithdrawsTheCallsOfThisClientOnly) {
+  server_.jobs.events = {Event(1, v1::Job::RUNNING, 3)};
+  server_.jobs.endless = true;
+  const auto stop_waiting = [&] {
+    std::stop_source stop;
+    const RunContext context{.stop = stop.get_token(),
+                             .progress = [&stop](const Progress&) { stop.request_stop(); }};
+    EXPECT_TRUE(absl::IsCancelled(client_->WaitForJob("jobs/1", OnStop::kCancelJob, context).status()));
+    return server_.jobs.withdrawn_request_id;
+  };
+  ASSERT_EQ(client_->GenerateMaterial({})->name(), "jobs/1");
+  EXPECT_EQ(stop_waiting(), server_.materials.request_ids.at(0));
+  EXPECT_EQ(stop_waiting(), "");  // this client asks for it no more: it is someone else's job
+}
+
 }  // namespace
 }  // namespace tessera

@@ -107,6 +107,7 @@ class FakeJobs final : public v1::Jobs::Service {
   bool endless = false;
   std::vector<uint64_t> watched_after;
   std::atomic<int> num_cancels{0};
+  std::string withdrawn_request_id;  // of the last cancel; read it when no call runs
 
   grpc::Status WatchJob(grpc::ServerContext* context, const v1::WatchJobRequest* request,
                         grpc::ServerWriter<v1::JobEvent>* writer) override {
@@ -134,6 +135,7 @@ class FakeJobs final : public v1::Jobs::Service {
 
   grpc::Status CancelJob(grpc::ServerContext*, const v1::CancelJobRequest* request, v1::Job* job) override {
     ++num_cancels;
+    withdrawn_request_id = request->withdrawn_request_id();
     job->set_name(request->name());
     job->set_state(v1::Job::CANCELLED);
     return grpc::Status::OK;
@@ -153,6 +155,13 @@ class FakeMaterials final : public v1::Materials::Service {
       return kGone;
     }
     material->set_name(request->name());
+    return grpc::Status::OK;
+  }
+
+  grpc::Status GenerateMaterial(grpc::ServerContext*, const v1::GenerateMaterialRequest* request,
+                                v1::Job* job) override {
+    request_ids.push_back(request->request_id());
+    job->set_name("jobs/1");
     return grpc::Status::OK;
   }
 

@@ -108,7 +108,8 @@ TEST_F(JobTableTest, AJobHandedBackDoesNotCountItsAttempt) {
 
 TEST_F(JobTableTest, CancelsEndQueuedJobsAndOutliveACrash) {
   const auto cancel = [&](int64_t id) {
-    return *catalog_.Write<JobRecord>([&](Database& db) { return RequestCancel(db, id, catalog_.now_ms); });
+    return *catalog_.Write<JobRecord>(
+        [&](Database& db) { return RequestCancel(db, id, "", catalog_.now_ms); });
   };
   const int64_t queued = Insert("materials/a", "1")->id;
   EXPECT_EQ(cancel(queued).job.state(), v1::Job::CANCELLED);
@@ -119,8 +120,9 @@ TEST_F(JobTableTest, CancelsEndQueuedJobsAndOutliveACrash) {
   EXPECT_TRUE(Find(running).cancel_requested);
   Recover(INT64_MAX);
   EXPECT_EQ(Find(running).job.state(), v1::Job::CANCELLED);
-  EXPECT_EQ(catalog_.Write<JobRecord>([](Database& db) { return RequestCancel(db, 99, 1); }).status().code(),
-            absl::StatusCode::kNotFound);
+  EXPECT_EQ(
+      catalog_.Write<JobRecord>([](Database& db) { return RequestCancel(db, 99, "", 1); }).status().code(),
+      absl::StatusCode::kNotFound);
 }
 
 TEST_F(JobTableTest, EqualWorkForOneNameIsOneJob) {
@@ -166,7 +168,8 @@ TEST_F(JobTableTest, InputsMustExistAndAreKeptUntilTheJobEnds) {
   catalog_.now_ms += 2 * kUnnamedBlobKeptMs;
   ASSERT_TRUE(catalog_.blobs->CollectGarbage().ok());
   EXPECT_TRUE(catalog_.blobs->Get(*sha256).ok());
-  ASSERT_TRUE(catalog_.Write<JobRecord>([&](Database& db) { return RequestCancel(db, job->id, 1); }).ok());
+  ASSERT_TRUE(
+      catalog_.Write<JobRecord>([&](Database& db) { return RequestCancel(db, job->id, "", 1); }).ok());
   ASSERT_TRUE(catalog_.blobs->CollectGarbage().ok());
   EXPECT_FALSE(catalog_.blobs->Get(*sha256).ok());
 }

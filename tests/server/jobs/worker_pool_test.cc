@@ -84,9 +84,10 @@ class WorkerPoolTest : public testing::Test {
   absl::Status DeleteJobs() {
     return catalog_.connections->Write([](Database& db) { return db.RunScript("DELETE FROM jobs"); });
   }
-  int64_t Insert(const std::string& name, const std::string& params, const std::string& kind = "test") {
+  int64_t Insert(const std::string& name, const std::string& params, const std::string& kind = "test",
+                 const std::string& request_id = "") {
     const auto record = catalog_.Write<JobRecord>([&](Database& db) {
-      return InsertJob(db, {kind, 1, params, {}, name, OnTaken::kRefuse}, catalog_.now_ms);
+      return InsertJob(db, {kind, 1, params, {}, name, OnTaken::kRefuse, request_id}, catalog_.now_ms);
     });
     EXPECT_TRUE(record.ok()) << record.status();
     if (pool_ != nullptr) {
@@ -199,6 +200,33 @@ TEST_F(WorkerPoolTest, AJobThatNobodyHoldsRunsAgainAfterItsLease) {
   ASSERT_TRUE(pool_->Cancel(running).ok());
   EXPECT_EQ(WaitForEnd(id).state(), v1::Job::SUCCEEDED);
   EXPECT_EQ(WaitForEnd(running).state(), v1::Job::CANCELLED);
+}
+
+TEST_F(WorkerPoolTest, ASharedJobGoesOnUntilItsLastRequesterWithdraws) {
+  StartPool(1);
+  const int64_t id = Insert("materials/a", "sleep", "test", "first");
+  EXPECT_EQ(Insert("materials/a", "sleep", "test", "second"), id);
+  WaitForRun(id);
+  for (int i = 0; i < 2; ++i) {  // said twice, it still speaks for the first caller alone
+    const auto after = pool_->Cancel(id, "first");
+    ASSERT_TRUE(after.ok()) << after.status();
+    EXPECT_EQ(after->job.state(), v1::Job::RUNNING);
+    EXPECT_FALSE(after->cancel_requested);
+  }
+  std::this_thread::sleep_for(kCancelLimit);
+  EXPECT_EQ(Find(id).state(), v1::Job::RUNNING);
+  ASSERT_TRUE(pool_->Cancel(id, "second").ok());
+  EXPECT_EQ(WaitForEnd(id).state(), v1::Job::CANCELLED);
+}
+
+TEST_F(WorkerPoolTest, ACancelWithoutARequestEndsASharedJobForAll) {
+  StartPool(1);
+  const int64_t id = Insert("materials/a", "sleep", "test", "first");
+  EXPECT_EQ(Insert("materials/a", "sleep"), id);
+  WaitForRun(id);
+  EXPECT_FALSE(pool_->Cancel(id, "first")->cancel_requested);
+  ASSERT_TRUE(pool_->Cancel(id).ok());
+  EXPECT_EQ(WaitForEnd(id).state(), v1::Job::CANCELLED);
 }
 
 TEST_F(WorkerPoolTest, ARunningJobIsCancelledWithinASecond) {

@@ -108,6 +108,26 @@ TEST_F(ServerTest, ACancelEndsAJobWithinASecond) {
   EXPECT_EQ(stubs_->Cancel(job->name())->state(), v1::Job::CANCELLED);
 }
 
+TEST_F(ServerTest, AClientThatWithdrawsLeavesTheJobToTheOthers) {
+  v1::GenerateMaterialRequest request = Stubs::SmallMaterial("a", 2);
+  request.set_request_id("first");
+  const auto first = stubs_->Generate(request);
+  ASSERT_TRUE(first.ok()) << first.status();
+  request.set_request_id("second");
+  ASSERT_EQ(stubs_->Generate(request)->name(), first->name());
+  WaitForRun(first->name());
+  v1::CancelJobRequest cancel;
+  cancel.set_name(first->name());
+  const auto withdraw = [&](const std::string& request_id) {
+    cancel.set_withdrawn_request_id(request_id);
+    return Stubs::Call(&v1::Jobs::Stub::CancelJob, *stubs_->jobs, cancel);
+  };
+  EXPECT_EQ(withdraw("first")->state(), v1::Job::RUNNING);
+  EXPECT_EQ(stubs_->Wait(first->name(), 300)->state(), v1::Job::RUNNING);
+  EXPECT_TRUE(withdraw("second").ok());
+  EXPECT_EQ(stubs_->Wait(first->name())->state(), v1::Job::CANCELLED);
+}
+
 // Whoever waits learns that the catalog cannot tell the end, instead of waiting for ever.
 TEST_F(ServerTest, WatchesAndWaitsEndWhenTheJobIsLost) {
   const auto job = stubs_->Generate(Stubs::SmallMaterial("a", 2));
