@@ -75,7 +75,8 @@ absl::StatusOr<std::unique_ptr<Client>> Client::Connect(ClientOptions options, c
   arguments.SetMaxReceiveMessageSize(kLargestMessageBytes);
   // gRPC's own reconnection must not wait longer than ours, or every attempt of ours would fail unheard.
   arguments.SetInt(GRPC_ARG_INITIAL_RECONNECT_BACKOFF_MS, options.retry.first_wait_ms);
-  arguments.SetInt(GRPC_ARG_MIN_RECONNECT_BACKOFF_MS, options.retry.first_wait_ms);
+  // In spite of its name the time that one attempt to connect may take.
+  arguments.SetInt(GRPC_ARG_MIN_RECONNECT_BACKOFF_MS, options.connect_timeout_ms);
   arguments.SetInt(GRPC_ARG_MAX_RECONNECT_BACKOFF_MS, options.retry.longest_wait_ms);
   const std::shared_ptr<grpc::Channel> channel =
       grpc::CreateCustomChannel(options.address, grpc::InsecureChannelCredentials(), arguments);
