@@ -37,6 +37,7 @@ int RunTessera(int argc, const char* const* argv, std::stop_token stop) {
   AddMeshCommands(app, session);
   AddPreviewCommand(app, session);
   AddSheetCommand(app, session);
+  AddStabilityCommand(app, session);
   AddJobCommands(app, session);
   AddServerCommands(app, session);
   AddCompletionCommand(app, session);
