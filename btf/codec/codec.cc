@@ -6,6 +6,7 @@
 #include "btf/codec/dfmf/dfmf_codec.h"
 #include "btf/codec/dsh/dsh_codec.h"
 #include "btf/codec/dsh/dsh_encoder.h"
+#include "btf/codec/view_pca/view_pca_codec.h"
 
 namespace tessera {
 namespace {
@@ -15,11 +16,11 @@ std::span<const Codec* const> Codecs() {
   static const DshCodec dsh("dsh", &EncodeDsh);
   static const DshCodec dsh_ls("dsh-ls", &EncodeDshLs);
   static const DfmfCodec dfmf;
+  static const ViewPcaCodec view_pca;
   static const std::array codecs = {
-      static_cast<const Codec*>(&dsh_cls),
-      static_cast<const Codec*>(&dsh),
-      static_cast<const Codec*>(&dsh_ls),
-      static_cast<const Codec*>(&dfmf),
+      static_cast<const Codec*>(&dsh_cls),  static_cast<const Codec*>(&dsh),
+      static_cast<const Codec*>(&dsh_ls),   static_cast<const Codec*>(&dfmf),
+      static_cast<const Codec*>(&view_pca),
   };
   return codecs;
 }

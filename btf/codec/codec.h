@@ -32,6 +32,7 @@ struct EncodeParams {
   int kl = 25;  // light coefficients, one of 1, 4, 9, 16, 25, 36, 49
   int kv = 25;  // view coefficients, likewise
   ClsEnergy cls_energy = ClsEnergy::kHemisphere;
+  int eigen_textures = 5;  // of each view of "view-pca", 1 to 255
   // Of "dfmf", at most one of the three; none: rank kDefaultDfmfRank.
   int rank = 0;  // coefficients a texel, 0 for none; fewer where more would add nothing
   double max_error =

@@ -16,6 +16,7 @@
 #include "btf/base/status_macros.h"
 #include "btf/codec/dfmf/dfmf_decoder.h"
 #include "btf/codec/dsh/dsh_decoder.h"
+#include "btf/codec/view_pca/view_pca_decoder.h"
 
 namespace tessera {
 namespace {
@@ -37,6 +38,7 @@ constexpr std::array kKnownCodecs = {
     KnownCodec{"dsh", 1, &Make<DshDecoder>},
     KnownCodec{"dsh-ls", 1, &Make<DshDecoder>},
     KnownCodec{"dfmf", kDfmfVersion, &Make<DfmfDecoder>},
+    KnownCodec{"view-pca", 1, &Make<ViewPcaDecoder>},
 };
 
 constexpr int kLanes = 8;

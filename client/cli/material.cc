@@ -28,6 +28,7 @@ struct CodecFlags {
   std::string codec = "dsh-cls";
   uint32_t kl = 25;
   uint32_t kv = 25;
+  uint32_t eigen_textures = 5;
   std::string cls_energy = "hemisphere";
 };
 
@@ -37,6 +38,11 @@ void AddCodecFlags(CLI::App* command, CodecFlags& flags) {
   command->add_option("--kl", flags.kl, "dsh*: light coefficients, 1, 4, 9, 16, 25, 36 or 49")
       ->capture_default_str();
   command->add_option("--kv", flags.kv, "dsh*: view coefficients, likewise")->capture_default_str();
+  command
+      ->add_option("--eigen-textures", flags.eigen_textures,
+                   "view-pca: eigen-textures a view, 1 to 255; no more than lights - 1 are kept")
+      ->check(CLI::Range(1, 255))
+      ->capture_default_str();
   command->add_option("--cls-energy", flags.cls_energy, "dsh-cls: energy bound")
       ->check(CLI::IsMember({"hemisphere", "sphere"}))
       ->capture_default_str();
@@ -47,6 +53,7 @@ v1::EncodeOptions MessageOf(const CodecFlags& flags) {
   message.set_codec(flags.codec);
   message.set_kl(flags.kl);
   message.set_kv(flags.kv);
+  message.set_eigen_textures(flags.eigen_textures);
   message.set_cls_energy(flags.cls_energy);
   return message;
 }
@@ -138,6 +145,7 @@ absl::Status ImportHere(Session& session, Client& client, const ImportFlags& fla
       .kl = static_cast<int>(flags.codec.kl),
       .kv = static_cast<int>(flags.codec.kv),
       .cls_energy = flags.codec.cls_energy == "sphere" ? ClsEnergy::kSphere : ClsEnergy::kHemisphere,
+      .eigen_textures = static_cast<int>(flags.codec.eigen_textures),
       .memory_budget_bytes = options.memory_budget_bytes,
       .spill_folder = options.spill_folder};
   TESSERA_RETURN_IF_ERROR(CheckNameIsFree(client, name, flags.replace, context));

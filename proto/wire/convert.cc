@@ -103,6 +103,9 @@ void FillDefaults(v1::EncodeOptions& message) {
   if (message.kv() == 0) {
     message.set_kv(defaults.kv);
   }
+  if (message.eigen_textures() == 0) {
+    message.set_eigen_textures(defaults.eigen_textures);
+  }
   if (message.cls_energy().empty()) {
     message.set_cls_energy("hemisphere");
   }
@@ -116,9 +119,14 @@ absl::StatusOr<EncodeParams> EncodeParamsFromMessage(const v1::EncodeOptions& me
     return absl::InvalidArgumentError(
         absl::StrCat("kl ", filled.kl(), ", kv ", filled.kv(), ": at most ", kMaxCoefficients));
   }
+  if (filled.eigen_textures() > kMaxCoefficients) {
+    return absl::InvalidArgumentError(
+        absl::StrCat("eigen_textures ", filled.eigen_textures(), ": at most ", kMaxCoefficients));
+  }
   EncodeParams params;
   params.kl = static_cast<int>(filled.kl());
   params.kv = static_cast<int>(filled.kv());
+  params.eigen_textures = static_cast<int>(filled.eigen_textures());
   if (filled.cls_energy() == "sphere") {
     params.cls_energy = ClsEnergy::kSphere;
   } else if (filled.cls_energy() != "hemisphere") {

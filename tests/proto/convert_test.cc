@@ -41,6 +41,11 @@ TEST(ConvertTest, EncodeOptionsHaveDefaults) {
   message.set_kl(16);
   EXPECT_EQ(EncodeParamsFromMessage(message)->kl, 16);
   EXPECT_EQ(EncodeParamsFromMessage(message)->cls_energy, ClsEnergy::kSphere);
+  EXPECT_EQ(EncodeParamsFromMessage(message)->eigen_textures, 5);
+  message.set_eigen_textures(12);
+  EXPECT_EQ(EncodeParamsFromMessage(message)->eigen_textures, 12);
+  message.set_eigen_textures(1u << 31);
+  EXPECT_EQ(EncodeParamsFromMessage(message).status().code(), absl::StatusCode::kInvalidArgument);
 }
 
 TEST(ConvertTest, LightsAndCamerasComeBack) {

@@ -23,7 +23,7 @@ using testing::HasSubstr;
 enum class Pattern { kBumps, kStripes };
 
 // A diffuse surface of bumps or of stripes along x, lit and seen from a few directions.
-Material MakeMaterial(int width, int height, Pattern pattern) {
+Material MakeMaterial(int width, int height, Pattern pattern, std::string_view codec = "dsh-cls") {
   const std::vector<double> noise = SmoothNoise(width, height, 2, 11);
   BtfInfo info{.width = width,
                .height = height,
@@ -54,8 +54,7 @@ Material MakeMaterial(int width, int height, Pattern pattern) {
   }
   const auto source = MemoryBtf::Create(info, samples);
   EXPECT_TRUE(source.ok()) << source.status();
-  absl::StatusOr<Material> material =
-      FindCodec("dsh-cls")->Encode(**source, {.kl = 9, .kv = 1}, RunContext{});
+  absl::StatusOr<Material> material = FindCodec(codec)->Encode(**source, {.kl = 9, .kv = 1}, RunContext{});
   EXPECT_TRUE(material.ok()) << material.status();
   return *std::move(material);
 }
@@ -65,6 +64,20 @@ SynthesisParams SmallParams() {
   params.tile_size = 16;
   params.strip_height = 8;
   return params;
+}
+
+TEST(SynthesizeTileSetTest, ServesEigenTextures) {
+  const Material material = MakeMaterial(40, 36, Pattern::kBumps, "view-pca");
+  const absl::StatusOr<TileSet> set =
+      SynthesizeTileSet(material, **FindArrangement("surface-96"), SmallParams(), RunContext{});
+  ASSERT_TRUE(set.ok()) << set.status();
+  EXPECT_EQ(set->btfels.codec_id, "view-pca");
+  EXPECT_EQ(set->btfels.tables.size(), 3u);
+  const auto bytes = SerializeTileSet(*set);
+  ASSERT_TRUE(bytes.ok()) << bytes.status();
+  const auto read = ParseTileSet(std::as_bytes(std::span(*bytes)));
+  ASSERT_TRUE(read.ok()) << read.status();
+  EXPECT_EQ(read->btfels.codes, set->btfels.codes);
 }
 
 TEST(SynthesizeTileSetTest, EveryTexelIsABtfelOfTheMaterial) {

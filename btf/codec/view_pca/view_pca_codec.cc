@@ -1,0 +1,23 @@
+#include "btf/codec/view_pca/view_pca_codec.h"
+
+#include "btf/codec/embedding.h"
+#include "btf/codec/view_pca/view_pca_encoder.h"
+#include "btf/codec/view_pca/view_pca_glsl.h"
+
+namespace tessera {
+
+absl::StatusOr<Material> ViewPcaCodec::Encode(BtfSource& source, const EncodeParams& params,
+                                              const RunContext& context) const {
+  return EncodeViewPca(source, params, context);
+}
+
+absl::StatusOr<Embedding> ViewPcaCodec::Embed(const Material& material, int dims,
+                                              const RunContext& context) const {
+  return EmbedDecoded(material, dims, context);
+}
+
+absl::StatusOr<CodecGlsl> ViewPcaCodec::Glsl(const BtfelTable& table) const {
+  return ViewPcaGlsl(table);
+}
+
+}  // namespace tessera
