@@ -41,6 +41,10 @@ constexpr std::array kKnownCodecs = {
     KnownCodec{"view-pca", 1, &Make<ViewPcaDecoder>},
 };
 
+// In DecodeTexels: runs of fewer codes (two cache lines) are fetched so many texels ahead.
+constexpr int kPrefetchedRun = 128;
+constexpr size_t kPrefetchedTexels = 16;
+
 constexpr int kLanes = 8;
 using Lanes = Eigen::Array<float, kLanes, 1>;
 
@@ -132,7 +136,19 @@ void Decoder::DecodeTexels(std::span<const uint8_t> codes, const Eigen::Vector3d
   }
   const std::array<float, 3> start = {static_cast<float>(constant[0]), static_cast<float>(constant[1]),
                                       static_cast<float>(constant[2])};
+  // Codecs that read little of a BTFel step through memory too wide for the processor to see ahead.
+  std::vector<int> short_runs;
+  for (const LinearForm::Run& run : form.runs) {
+    if (run.count > 0 && run.count < kPrefetchedRun) {
+      short_runs.insert(short_runs.end(), {run.first, run.first + run.count - 1});
+    }
+  }
   for (size_t texel = 0; texel * k < codes.size(); ++texel) {
+    if ((texel + kPrefetchedTexels) * k < codes.size()) {
+      for (const int code : short_runs) {
+        __builtin_prefetch(codes.data() + (texel + kPrefetchedTexels) * k + code);
+      }
+    }
     std::array<float, 3> sum = start;
     const float* weight = weights.data();
     for (const LinearForm::Run& run : form.runs) {
