@@ -63,23 +63,39 @@ void ForImage(const BtfInfo& info, size_t view, size_t light, std::vector<float>
 // are missing promise a refusal.
 const std::map<std::string, std::map<std::string, double>>& CaseLimits() {
   static const std::map<std::string, std::map<std::string, double>> limits = {
-      {"none", {{"dsh-ls", 1.6}, {"dsh-cls", 0.07}, {"dsh", 0.058}, {"dfmf", 0.028}}},
-      {"20 random lights and views", {{"dsh-ls", 0.62}, {"dsh-cls", 0.28}, {"dsh", 0.77}, {"dfmf", 0.14}}},
-      {"curet directions, 50", {{"dsh-ls", 0.21}, {"dsh-cls", 0.097}, {"dsh", 0.53}, {"dfmf", 0.044}}},
-      {"decoded at 80 degrees", {{"dsh-ls", 2.2}, {"dsh-cls", 0.16}, {"dsh", 0.15}, {"dfmf", 0.065}}},
-      {"decoded at 85 degrees", {{"dsh-ls", 2.2}, {"dsh-cls", 0.16}, {"dsh", 0.15}, {"dfmf", 0.065}}},
-      {"decoded at 89 degrees", {{"dsh-ls", 2.2}, {"dsh-cls", 0.16}, {"dsh", 0.15}, {"dfmf", 0.065}}},
-      {"no direction below 45 degrees", {{"dsh-ls", 0.14}, {"dsh-cls", 0.37}, {"dsh", 0.99}, {"dfmf", 0.11}}},
-      {"one image of value 10", {{"dsh-ls", 1.9}, {"dsh-cls", 0.1}, {"dsh", 0.14}, {"dfmf", 0.083}}},
-      {"highlights clipped at 0.8", {{"dsh-ls", 30}, {"dsh-cls", 0.44}, {"dsh", 0.41}, {"dfmf", 0.37}}},
-      {"noise 40 dB", {{"dsh-ls", 2.8}, {"dsh-cls", 0.07}, {"dsh", 0.058}, {"dfmf", 0.028}}},
-      {"noise 30 dB", {{"dsh-ls", 5.2}, {"dsh-cls", 0.07}, {"dsh", 0.059}, {"dfmf", 0.031}}},
-      {"noise 20 dB", {{"dsh-ls", 19}, {"dsh-cls", 0.073}, {"dsh", 0.071}, {"dfmf", 0.047}}},
-      {"all black", {{"dsh-ls", 0.001}, {"dsh-cls", 0.001}, {"dsh", 0.001}, {"dfmf", 0.001}}},
-      {"one constant", {{"dsh-ls", 0.001}, {"dsh-cls", 0.057}, {"dsh", 0.001}, {"dfmf", 0.0064}}},
-      {"lobe of exponent 3000", {{"dsh-ls", 290}, {"dsh-cls", 0.85}, {"dsh", 0.87}, {"dfmf", 0.92}}},
-      {"1x1 texels", {{"dsh-ls", 0.049}, {"dsh-cls", 0.059}, {"dsh", 0.049}, {"dfmf", 0.013}}},
-      {"1x16 texels", {{"dsh-ls", 2.1}, {"dsh-cls", 0.072}, {"dsh", 0.059}, {"dfmf", 0.019}}},
+      {"none", {{"dsh-ls", 1.6}, {"dsh-cls", 0.07}, {"dsh", 0.058}, {"dfmf", 0.028}, {"view-pca", 0.076}}},
+      {"20 random lights and views",
+       {{"dsh-ls", 0.62}, {"dsh-cls", 0.28}, {"dsh", 0.77}, {"dfmf", 0.14}, {"view-pca", 0.24}}},
+      {"curet directions, 50",
+       {{"dsh-ls", 0.21}, {"dsh-cls", 0.097}, {"dsh", 0.53}, {"dfmf", 0.044}, {"view-pca", 0.095}}},
+      {"decoded at 80 degrees",
+       {{"dsh-ls", 2.2}, {"dsh-cls", 0.16}, {"dsh", 0.15}, {"dfmf", 0.065}, {"view-pca", 0.11}}},
+      {"decoded at 85 degrees",
+       {{"dsh-ls", 2.2}, {"dsh-cls", 0.16}, {"dsh", 0.15}, {"dfmf", 0.065}, {"view-pca", 0.11}}},
+      {"decoded at 89 degrees",
+       {{"dsh-ls", 2.2}, {"dsh-cls", 0.16}, {"dsh", 0.15}, {"dfmf", 0.065}, {"view-pca", 0.11}}},
+      {"no direction below 45 degrees",
+       {{"dsh-ls", 0.14}, {"dsh-cls", 0.37}, {"dsh", 0.99}, {"dfmf", 0.11}, {"view-pca", 0.3}}},
+      {"one image of value 10",
+       {{"dsh-ls", 1.9}, {"dsh-cls", 0.1}, {"dsh", 0.14}, {"dfmf", 0.083}, {"view-pca", 0.08}}},
+      {"highlights clipped at 0.8",
+       {{"dsh-ls", 30}, {"dsh-cls", 0.44}, {"dsh", 0.41}, {"dfmf", 0.37}, {"view-pca", 0.43}}},
+      {"noise 40 dB",
+       {{"dsh-ls", 2.8}, {"dsh-cls", 0.07}, {"dsh", 0.058}, {"dfmf", 0.028}, {"view-pca", 0.076}}},
+      {"noise 30 dB",
+       {{"dsh-ls", 5.2}, {"dsh-cls", 0.07}, {"dsh", 0.059}, {"dfmf", 0.031}, {"view-pca", 0.077}}},
+      {"noise 20 dB",
+       {{"dsh-ls", 19}, {"dsh-cls", 0.073}, {"dsh", 0.071}, {"dfmf", 0.047}, {"view-pca", 0.081}}},
+      {"all black",
+       {{"dsh-ls", 0.001}, {"dsh-cls", 0.001}, {"dsh", 0.001}, {"dfmf", 0.001}, {"view-pca", 0.001}}},
+      {"one constant",
+       {{"dsh-ls", 0.001}, {"dsh-cls", 0.057}, {"dsh", 0.001}, {"dfmf", 0.0064}, {"view-pca", 0.001}}},
+      {"lobe of exponent 3000",
+       {{"dsh-ls", 290}, {"dsh-cls", 0.85}, {"dsh", 0.87}, {"dfmf", 0.92}, {"view-pca", 0.91}}},
+      {"1x1 texels",
+       {{"dsh-ls", 0.049}, {"dsh-cls", 0.059}, {"dsh", 0.049}, {"dfmf", 0.013}, {"view-pca", 0.035}}},
+      {"1x16 texels",
+       {{"dsh-ls", 2.1}, {"dsh-cls", 0.072}, {"dsh", 0.059}, {"dfmf", 0.019}, {"view-pca", 0.065}}},
   };
   return limits;
 }
@@ -94,6 +110,19 @@ constexpr std::array<OrderLimits, 3> kOrderLimits = {{
     {"dsh", {0.61, 0.23, 0.15, 0.088, 0.058, 0.04, 0.47}},
 }};
 
+struct RankLimit {
+  std::string_view setting;
+  double limit;
+};
+constexpr std::array kRankLimits = {
+    RankLimit{"rank 1", 0.5},
+    RankLimit{"rank 36", 0.015},
+    RankLimit{"rank 1000", 0.015},
+    RankLimit{"1 eigen-textures", 0.34},
+    RankLimit{"81 eigen-textures", 0.042},
+    RankLimit{"255 eigen-textures", 0.042},
+};
+
 }  // namespace
 
 std::vector<StabilityCase> StabilityCases() {
@@ -102,8 +131,11 @@ std::vector<StabilityCase> StabilityCases() {
   std::vector<StabilityCase> cases;
   cases.push_back({"none", plain, ubo, ubo});
   StabilityCase orders{"8 bits, every order", plain, ubo, ubo};
-  orders.compares_orders = true;
+  orders.methods = MethodSet::kOrders;
   cases.push_back(std::move(orders));
+  StabilityCase ranks{"36 texels, ranks up to and beyond theirs", plain, ubo, ubo};
+  ranks.methods = MethodSet::kRanks;
+  cases.push_back(std::move(ranks));
   cases.push_back({"20 random lights and views", plain, RandomDirections(20, 5), RandomDirections(20, 6)});
   cases.push_back({"curet directions, 50", plain, NamedDirections("curet"), NamedDirections("curet")});
   for (const double theta_deg : {80.0, 85.0, 89.0}) {
@@ -152,16 +184,33 @@ std::vector<StabilityCase> StabilityCases() {
   return cases;
 }
 
+namespace {
+
 std::vector<StabilityMethod> StandardMethods() {
   const EncodeParams harmonics{.kl = 25, .kv = 25};
   return {{"dsh-ls", "kl 25, kv 25", harmonics},
           {"dsh-cls", "kl 25, kv 25", harmonics},
           {"dsh", "kl 25, kv 25", harmonics},
-          {"dfmf", "rank 16", {.rank = 16}}};
+          {"dfmf", "rank 16", {.rank = 16}},
+          {"view-pca", "5 eigen-textures", {.eigen_textures = 5}}};
 }
 
-std::vector<StabilityMethod> OrderMethods() {
+}  // namespace
+
+std::vector<StabilityMethod> MethodsOf(MethodSet set) {
+  if (set == MethodSet::kStandard) {
+    return StandardMethods();
+  }
   std::vector<StabilityMethod> methods;
+  if (set == MethodSet::kRanks) {
+    for (const int rank : {1, 36, 1000}) {
+      methods.push_back({"dfmf", absl::StrCat("rank ", rank), {.rank = rank}});
+    }
+    for (const int count : {1, 81, 255}) {
+      methods.push_back({"view-pca", absl::StrCat(count, " eigen-textures"), {.eigen_textures = count}});
+    }
+    return methods;
+  }
   for (const char* codec : {"dsh-ls", "dsh-cls", "dsh"}) {
     for (int order = 1; order <= 7; ++order) {
       const int n = order * order;
@@ -172,10 +221,14 @@ std::vector<StabilityMethod> OrderMethods() {
 }
 
 std::optional<double> PromisedLimit(const StabilityCase& c, const StabilityMethod& method) {
-  if (c.compares_orders) {
+  if (c.methods == MethodSet::kOrders) {
     const auto* const found = std::ranges::find(kOrderLimits, method.codec, &OrderLimits::codec);
     const auto order = static_cast<size_t>(std::lround(std::sqrt(method.params.kl)));
     return found == kOrderLimits.end() ? std::nullopt : std::optional(found->by_order[order - 1]);
+  }
+  if (c.methods == MethodSet::kRanks) {
+    const auto* const found = std::ranges::find(kRankLimits, method.setting, &RankLimit::setting);
+    return found == kRankLimits.end() ? std::nullopt : std::optional(found->limit);
   }
   const auto& table = CaseLimits();
   const auto found = table.find(c.stress);

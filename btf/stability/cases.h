@@ -12,6 +12,12 @@
 
 namespace tessera {
 
+enum class MethodSet {
+  kStandard,  // every codec at a usual setting
+  kOrders,  // "dsh-ls", "dsh-cls" and "dsh" with 1x1 to 49x49 functions, with the figures that only they have
+  kRanks,   // "dfmf" and "view-pca" from one component to more than there can be
+};
+
 struct StabilityCase {
   std::string stress;
   AnalyticSurface surface;
@@ -23,8 +29,7 @@ struct StabilityCase {
   std::optional<double> constant = std::nullopt;
   // Errors everywhere are then taken at this polar angle of light and view alone.
   std::optional<double> decode_theta_rad = std::nullopt;
-  // Run with OrderMethods() in place of StandardMethods(), with the figures that double harmonics have.
-  bool compares_orders = false;
+  MethodSet methods = MethodSet::kStandard;
 };
 
 struct StabilityMethod {
@@ -34,10 +39,7 @@ struct StabilityMethod {
 };
 
 [[nodiscard]] std::vector<StabilityCase> StabilityCases();
-// Every codec at a usual setting.
-[[nodiscard]] std::vector<StabilityMethod> StandardMethods();
-// "dsh-ls", "dsh-cls" and "dsh" with 1x1 to 49x49 functions.
-[[nodiscard]] std::vector<StabilityMethod> OrderMethods();
+[[nodiscard]] std::vector<StabilityMethod> MethodsOf(MethodSet set);
 
 // The rows' promise: the relative error everywhere, absent where a refusal is promised.
 [[nodiscard]] std::optional<double> PromisedLimit(const StabilityCase& c, const StabilityMethod& method);

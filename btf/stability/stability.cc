@@ -186,7 +186,7 @@ absl::StatusOr<StabilityRow> RunMethod(const StabilityCase& c, MemoryBtf& source
   };
   const Errors measured = ErrorsAt(c, decode, PairsOf(c), context);
   const Errors everywhere = ErrorsAt(c, decode, PairsEverywhere(c), context);
-  if (c.compares_orders) {
+  if (c.methods == MethodSet::kOrders) {
     TESSERA_ASSIGN_OR_RETURN(const UnroundedFit fit, FitUnrounded(source, *material, method.params));
     row.condition = fit.condition;
     row.error_before_quantisation = ErrorsAt(c, UnroundedDecode(*decoder, fit), PairsOf(c), context).relative;
@@ -243,7 +243,7 @@ absl::StatusOr<std::vector<StabilityRow>> RunStability(const RunContext& context
   for (size_t i = 0; i < cases.size(); ++i) {
     context.Report("stability", i, cases.size(), "cases");
     TESSERA_ASSIGN_OR_RETURN(const std::unique_ptr<MemoryBtf> source, SourceOf(cases[i]));
-    for (const StabilityMethod& method : cases[i].compares_orders ? OrderMethods() : StandardMethods()) {
+    for (const StabilityMethod& method : MethodsOf(cases[i].methods)) {
       TESSERA_ASSIGN_OR_RETURN(StabilityRow row, RunMethod(cases[i], *source, method, quiet));
       rows.push_back(std::move(row));
     }
