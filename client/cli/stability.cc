@@ -4,12 +4,12 @@
 
 #include <fmt/format.h>
 
+#include "btf/base/atomic_file.h"
 #include "btf/base/status_macros.h"
 #include "btf/stability/stability.h"
 #include "client/cli/commands.h"
 #include "client/cli/describe.h"
 #include "client/cli/exit_codes.h"
-#include "client/lib/atomic_file.h"
 
 namespace tessera::cli {
 namespace {
