@@ -34,10 +34,8 @@ struct KnownCodec {
 };
 
 constexpr std::array kKnownCodecs = {
-    KnownCodec{"dsh-cls", 1, &Make<DshDecoder>},
-    KnownCodec{"dsh", 1, &Make<DshDecoder>},
-    KnownCodec{"dsh-ls", 1, &Make<DshDecoder>},
-    KnownCodec{"dfmf", kDfmfVersion, &Make<DfmfDecoder>},
+    KnownCodec{"dsh-cls", 1, &Make<DshDecoder>},      KnownCodec{"dsh", 1, &Make<DshDecoder>},
+    KnownCodec{"dsh-ls", 1, &Make<DshDecoder>},       KnownCodec{"dfmf", kDfmfVersion, &Make<DfmfDecoder>},
     KnownCodec{"view-pca", 1, &Make<ViewPcaDecoder>},
 };
 
