@@ -62,7 +62,7 @@ Material Golden() {
 }
 
 std::string GoldenPath() {
-  return std::string(TESSERA_GOLDEN_DIR) + "/material_v1.tsra";
+  return TESSERA_GOLDEN_DIR "/material_v1.tsra";
 }
 
 std::string ReadGolden() {
