@@ -21,6 +21,12 @@ constexpr int kRunLength = 8;
 constexpr double kEpsilonShare = 0.01;  // of the mean exemplar gradient
 constexpr double kPercentile = 0.95;
 constexpr int kTexelsPerBlock = 256;
+// Recorded angles are rounded, since 15 degrees do not survive radians.
+constexpr double kAnglesPerDegree = 1e6;
+
+double RecordedDeg(double rad) {
+  return std::round(DegFromRad(rad) * kAnglesPerDegree) / kAnglesPerDegree;
+}
 
 float Difference(const ExemplarImage& image, uint32_t a, uint32_t b) {
   const float* const p = image.rgb[TurnsOfTexel(a)].data() + size_t{3} * BtfelOfTexel(a);
@@ -200,10 +206,10 @@ void CertificateBuilder::Add(const ExemplarImage& image) {
     }
     part->by_image.push_back(total);
   }
-  images_.push_back({{"view_polar_deg", DegFromRad(image.view.theta_rad)},
-                     {"view_azimuth_deg", DegFromRad(image.view.phi_rad)},
-                     {"light_polar_deg", DegFromRad(image.light.theta_rad)},
-                     {"light_azimuth_deg", DegFromRad(image.light.phi_rad)}});
+  images_.push_back({{"view_polar_deg", RecordedDeg(image.view.theta_rad)},
+                     {"view_azimuth_deg", RecordedDeg(image.view.phi_rad)},
+                     {"light_polar_deg", RecordedDeg(image.light.theta_rad)},
+                     {"light_azimuth_deg", RecordedDeg(image.light.phi_rad)}});
 }
 
 nlohmann::json CertificateBuilder::Describe(const Part& part) {

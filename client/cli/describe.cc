@@ -63,6 +63,10 @@ void AppendRecord(const Json& object, const std::string& prefix,
     const std::string name = prefix.empty() ? key : fmt::format("{}.{}", prefix, key);
     if (value.is_object()) {
       AppendRecord(value, name, lines);
+    } else if (value.is_array() && !value.empty() && value.front().is_object()) {
+      for (size_t i = 0; i < value.size(); ++i) {
+        lines.emplace_back(fmt::format("{}.{}", name, i), value[i].dump());
+      }
     } else if (std::string text = TextOf(value); !text.empty()) {
       lines.emplace_back(name, std::move(text));
     }

@@ -120,6 +120,7 @@ TEST(SynthesizeTileSetTest, EveryTexelIsABtfelOfTheMaterial) {
   EXPECT_LE(set->metadata["anisotropy"]["figure"].get<double>(), kAnisotropyLimit);
   EXPECT_LE(set->metadata["tiles"]["worst_mean_mismatch"].get<double>(), SmallParams().mean_threshold);
   EXPECT_EQ(set->certificate["images"].size(), 16u);
+  EXPECT_EQ(set->certificate["images"][0]["light_polar_deg"], 15.0);
   EXPECT_GT(set->certificate["insides"]["ratio"].get<double>(), 0.0);
   EXPECT_GT(set->certificate["borders"]["verbatim_share"].get<double>(), 0.0);
 }

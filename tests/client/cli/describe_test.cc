@@ -39,6 +39,8 @@ TEST(DescribeTest, TablesAndRecordsAlign) {
   EXPECT_EQ(TextTable({{"A", "B"}, {"long", "x"}}), "A     B\nlong  x");
   EXPECT_EQ(TextRecord(Json{{"a", 1}, {"b", {{"c", 0.123456789}}}, {"empty", ""}, {"list", {1, 2}}}),
             "a:     1\nb.c:   0.12346\nlist:  1 2");
+  EXPECT_EQ(TextRecord(Json{{"pairs", {{{"light_deg", 15}}, {{"light_deg", 45}}}}}),
+            "pairs.0:  {\"light_deg\":15}\npairs.1:  {\"light_deg\":45}");
 }
 
 }  // namespace
