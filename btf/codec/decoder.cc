@@ -39,10 +39,6 @@ constexpr std::array kKnownCodecs = {
     KnownCodec{"view-pca", 1, &Make<ViewPcaDecoder>},
 };
 
-// In DecodeTexels: runs of fewer codes (two cache lines) are fetched so many texels ahead.
-constexpr int kPrefetchedRun = 128;
-constexpr size_t kPrefetchedTexels = 16;
-
 constexpr int kLanes = 8;
 using Lanes = Eigen::Array<float, kLanes, 1>;
 
@@ -77,6 +73,106 @@ float Dot(const float* w, const uint8_t* codes, int count) {
     rest += w[i] * static_cast<float>(codes[i]);
   }
   return ((sums[0] + sums[1]) + (sums[2] + sums[3])).sum() + rest;
+}
+
+// In DecodeTexels: runs of at least so many codes that no other channel reads are summed one by one, the rest
+// for all channels together, so that a code is converted once.
+constexpr int kLongRun = 128;
+// Codecs that read little of a BTFel step through memory too wide for the processor to see ahead: what they
+// read is fetched so many texels ahead.
+constexpr size_t kPrefetchedTexels = 16;
+
+// Eight codes and their weights in each channel.
+struct Block {
+  int first = 0;
+  std::array<Lanes, 3> weights = {Lanes::Zero(), Lanes::Zero(), Lanes::Zero()};
+};
+
+struct LongRun {
+  LinearForm::Run run;
+  std::vector<float> weights;
+};
+
+// A form on codes: rgb = constant + what the long runs and the blocks add.
+struct CodeForm {
+  std::array<float, 3> constant;
+  std::vector<LongRun> long_runs;
+  std::vector<Block> blocks;
+  bool is_sparse = false;  // less than half of a BTFel is read
+};
+
+CodeForm MakeCodeForm(const LinearForm& form, std::span<const float> offset, std::span<const float> step) {
+  const int k = static_cast<int>(offset.size());
+  CodeForm result;
+  Eigen::Array3d constant = Eigen::Array3d::Zero();
+  std::vector<std::array<float, 3>> joint(k, {0.0F, 0.0F, 0.0F});
+  std::vector<bool> is_joint(k, false);
+  size_t used = 0;
+  const double* weight = form.weights.data();
+  for (const LinearForm::Run& run : form.runs) {
+    const bool is_shared = std::ranges::any_of(form.runs, [&run](const LinearForm::Run& other) {
+      return other.channel != run.channel && other.first == run.first;
+    });
+    const bool is_alone = k < kLanes || (run.count >= kLongRun && !is_shared);
+    if (is_alone) {
+      result.long_runs.push_back({run, std::vector<float>(run.count)});
+      used += run.count;
+    }
+    for (int i = 0; i < run.count; ++i) {
+      // weight * (offset + step * code) = constant + (weight * step) * code.
+      const int code = run.first + i;
+      const auto on_code = static_cast<float>(*weight * step[code]);
+      constant[run.channel] += *weight++ * offset[code];
+      if (is_alone) {
+        result.long_runs.back().weights[i] = on_code;
+      } else {
+        joint[code][run.channel] += on_code;
+        is_joint[code] = true;
+      }
+    }
+  }
+  for (int channel = 0; channel < 3; ++channel) {
+    result.constant[channel] = static_cast<float>(constant[channel]);
+  }
+  for (int i = 0; i < k; ++i) {
+    if (!is_joint[i]) {
+      continue;
+    }
+    // The last block ends with the BTFel, and leaves out what the one before it has.
+    Block& block = result.blocks.emplace_back();
+    block.first = std::min(i, k - kLanes);
+    for (int lane = i - block.first; lane < kLanes; ++lane) {
+      for (int channel = 0; channel < 3; ++channel) {
+        block.weights[channel][lane] = joint[block.first + lane][channel];
+      }
+    }
+    i = block.first + kLanes - 1;
+    used += kLanes;
+  }
+  result.is_sparse = 2 * used < static_cast<size_t>(k);
+  return result;
+}
+
+void DecodeTexel(const CodeForm& form, const uint8_t* codes, float* rgb) {
+  std::array<float, 3> sum = form.constant;
+  for (const LongRun& part : form.long_runs) {
+    sum[part.run.channel] += Dot(part.weights.data(), codes + part.run.first, part.run.count);
+  }
+  if (!form.blocks.empty()) {
+    std::array<Lanes, 3> sums = {Lanes::Zero(), Lanes::Zero(), Lanes::Zero()};
+    for (const Block& block : form.blocks) {
+      const Lanes values = LanesOf(codes + block.first);
+      for (int channel = 0; channel < 3; ++channel) {
+        sums[channel] += block.weights[channel] * values;
+      }
+    }
+    for (int channel = 0; channel < 3; ++channel) {
+      sum[channel] += sums[channel].sum();
+    }
+  }
+  for (int channel = 0; channel < 3; ++channel) {
+    rgb[channel] = std::max(sum[channel], 0.0F);
+  }
 }
 
 }  // namespace
@@ -122,40 +218,16 @@ void Decoder::DecodeTexels(std::span<const uint8_t> codes, const Eigen::Vector3d
   const size_t k = offset_.size();
   assert(codes.size() % k == 0 && rgb.size() == codes.size() / k * 3);
   const LinearForm form = Form(UnturnedFromTurned(light, turns), UnturnedFromTurned(view, turns));
-  // On codes: weight * (offset + step * code) = constant + (weight * step) * code.
-  std::vector<float> weights(form.weights.size());
-  Eigen::Array3d constant = Eigen::Array3d::Zero();
-  size_t w = 0;
-  for (const LinearForm::Run& run : form.runs) {
-    for (int i = run.first; i < run.first + run.count; ++i, ++w) {
-      constant[run.channel] += form.weights[w] * offset_[i];
-      weights[w] = static_cast<float>(form.weights[w] * step_[i]);
-    }
-  }
-  const std::array<float, 3> start = {static_cast<float>(constant[0]), static_cast<float>(constant[1]),
-                                      static_cast<float>(constant[2])};
-  // Codecs that read little of a BTFel step through memory too wide for the processor to see ahead.
-  std::vector<int> short_runs;
-  for (const LinearForm::Run& run : form.runs) {
-    if (run.count > 0 && run.count < kPrefetchedRun) {
-      short_runs.insert(short_runs.end(), {run.first, run.first + run.count - 1});
-    }
-  }
+  const CodeForm on_codes = MakeCodeForm(form, offset_, step_);
   for (size_t texel = 0; texel * k < codes.size(); ++texel) {
-    if ((texel + kPrefetchedTexels) * k < codes.size()) {
-      for (const int code : short_runs) {
-        __builtin_prefetch(codes.data() + (texel + kPrefetchedTexels) * k + code);
+    if (on_codes.is_sparse && (texel + kPrefetchedTexels) * k < codes.size()) {
+      const uint8_t* const ahead = codes.data() + (texel + kPrefetchedTexels) * k;
+      for (const Block& block : on_codes.blocks) {
+        __builtin_prefetch(ahead + block.first);
+        __builtin_prefetch(ahead + block.first + kLanes - 1);
       }
     }
-    std::array<float, 3> sum = start;
-    const float* weight = weights.data();
-    for (const LinearForm::Run& run : form.runs) {
-      sum[run.channel] += Dot(weight, codes.data() + texel * k + run.first, run.count);
-      weight += run.count;
-    }
-    for (int channel = 0; channel < 3; ++channel) {
-      rgb[3 * texel + channel] = std::max(sum[channel], 0.0F);
-    }
+    DecodeTexel(on_codes, codes.data() + texel * k, rgb.data() + 3 * texel);
   }
 }
 
