@@ -11,6 +11,7 @@
 
 #include "btf/base/status_macros.h"
 #include "btf/codec/dfmf/dfmf_decoder.h"
+#include "btf/codec/turns_glsl.h"
 
 namespace tessera {
 namespace {
@@ -24,7 +25,8 @@ int Groups(int count) {
   return (count + kGroup - 1) / kGroup;
 }
 
-// Where things lie. `codec_values`: the limits, the three colour axes, a (scale, offset) for each group, then
+// Where things lie. `codec_values`: the limits, the three colour axes, for each group the
+// scales of even and of odd factors and their offset, then
 // for each pair of nodes what the coefficients' offsets contribute to the three components. `codec_words`:
 // for each pair of nodes a texel for each group, luminance first, then either chrominance.
 struct Layout {
@@ -73,8 +75,9 @@ void FindNodes(vec3 d, float by_covered, int side, out ivec3 nodes, out vec3 wei
                    : (low ? vec3(1.0 - f - g, f, g) : vec3(f + g - 1.0, 1.0 - g, 1.0 - f));
 }
 
-vec4 Low(uvec4 u) { return vec4(u & 65535u); }
-vec4 High(uvec4 u) { return vec4(u >> 16); }
+// The signed 16-bit codes of four words, the lower ones 2^16 times too high, which saves moving them down.
+vec4 Low(uvec4 u) { return vec4(ivec4(u << 16)); }
+vec4 High(uvec4 u) { return vec4(ivec4(u) >> 16); }
 )";
 
 // The factors of group `group`: even ones in `even`, odd ones in `odd`.
@@ -89,7 +92,7 @@ std::string Interpolate(const std::string& group, const std::string& suffix) {
   }
   absl::StrAppend(&out,
                   absl::Substitute("    q = texelFetch(codec_values, 4 + $0);\n    even$1 = even$1 * q.x "
-                                   "+ q.y; odd$1 = odd$1 * q.x + q.y;\n",
+                                   "+ q.z; odd$1 = odd$1 * q.y + q.z;\n",
                                    group, suffix));
   return out;
 }
@@ -98,93 +101,68 @@ std::string Interpolate(const std::string& group, const std::string& suffix) {
 // 7, as the factors.
 std::string BlendCodes(const std::string& group, int btfel_texels) {
   return absl::Substitute(R"(    vec4 even_codes = vec4(0.0), odd_codes = vec4(0.0);
-    for (int n = 0; n < count; ++n) {
+    n = 0;
+    do {
       u = texelFetch(btfel_words, btfels[n] * $1 + (($0) >> 1));
       uvec2 c = (($0) & 1) == 0 ? u.xy : u.zw;
-      even_codes += weights[n] * vec4(c.x & 255u, (c.x >> 16) & 255u, c.y & 255u, (c.y >> 16) & 255u);
-      odd_codes += weights[n] * vec4((c.x >> 8) & 255u, c.x >> 24, (c.y >> 8) & 255u, c.y >> 24);
-    }
+      even_codes += weights[n] * vec4(ivec4(c.x, c.x >> 16, c.y, c.y >> 16) & 255);
+      odd_codes += weights[n] * vec4(ivec4(c.x >> 8, c.x >> 24, c.y >> 8, c.y >> 24) & 255);
+    } while (++n < count);
 )",
                           group, btfel_texels);
 }
 
 std::string Source(const Layout& layout) {
   std::string out = kHead;
-  absl::StrAppend(&out, absl::Substitute(R"(
+  absl::StrAppend(
+      &out, absl::Substitute(R"(
 vec3 BlendUnturned(ivec4 btfels, vec4 weights, int count, vec3 light, vec3 view) {
   vec4 limits = texelFetch(codec_values, 0);
-  // Loops of no steps, since llvmpipe leaves loops early but not functions.
   bool is_lit = light.z > 0.0 && view.z > 0.0 && count > 0;
-  int luma_groups = is_lit ? $0 : 0;
-  int chroma_groups = is_lit ? $1 : 0;
   ivec3 light_nodes, view_nodes;
   vec3 light_weights, view_weights;
-  FindNodes(light, limits.y, $2, light_nodes, light_weights);
-  FindNodes(view, limits.z, $3, view_nodes, view_weights);
-  float total = 0.0;
-  for (int n = 0; n < count; ++n) {
-    total += weights[n];
-  }
-  ivec3 pairs0 = light_nodes.x * $4 + view_nodes, pairs1 = light_nodes.y * $4 + view_nodes;
-  ivec3 pairs2 = light_nodes.z * $4 + view_nodes;
+  FindNodes(light, limits.y, $0, light_nodes, light_weights);
+  FindNodes(view, limits.z, $1, view_nodes, view_weights);
+  float total = dot(weights, vec4(1.0));
+  ivec3 pairs0 = light_nodes.x * $2 + view_nodes, pairs1 = light_nodes.y * $2 + view_nodes;
+  ivec3 pairs2 = light_nodes.z * $2 + view_nodes;
   vec3 pair0 = light_weights.x * view_weights, pair1 = light_weights.y * view_weights;
   vec3 pair2 = light_weights.z * view_weights;
   vec3 sum = vec3(0.0);
-  for (int i = 0; i < min(luma_groups, 1); ++i) {
 )",
-                                         layout.luma_groups, layout.chroma_groups, layout.light_nodes,
-                                         layout.view_nodes, layout.view_nodes * layout.view_nodes));
+                             layout.light_nodes, layout.view_nodes, layout.view_nodes * layout.view_nodes));
   for (int i = 0; i < 3; ++i) {
     for (int j = 0; j < 3; ++j) {
       absl::StrAppend(
-          &out, absl::Substitute("    sum += pair$0[$1] * texelFetch(codec_values, $2 + pairs$0[$1]).xyz;\n",
-                                 i, j, layout.pairs_begin()));
+          &out, absl::Substitute("  sum += pair$0[$1] * texelFetch(codec_values, $2 + pairs$0[$1]).xyz;\n", i,
+                                 j, layout.pairs_begin()));
     }
   }
-  absl::StrAppend(&out, "    sum *= total;\n  }\n");
+  absl::StrAppend(&out, "  sum *= total;\n");
   for (int i = 0; i < 3; ++i) {
     absl::StrAppend(&out, absl::Substitute("  ivec3 words$0 = pairs$0 * $1;\n", i, layout.num_groups()));
   }
-  absl::StrAppend(&out, "  uvec4 u;\n  vec4 q;\n  for (int g = 0; g < luma_groups; ++g) {\n",
-                  Interpolate("g", ""), BlendCodes("g", layout.btfel_texels()),
-                  "    sum.x += dot(even, even_codes) + dot(odd, odd_codes);\n  }\n");
+  absl::StrAppend(&out, "  uvec4 u;\n  vec4 q;\n  int n, g = 0;\n  do {\n", Interpolate("g", ""),
+                  BlendCodes("g", layout.btfel_texels()),
+                  "    sum.x += dot(even, even_codes) + dot(odd, odd_codes);\n  } while (++g < ",
+                  layout.luma_groups, ");\n");
   if (layout.chroma_groups > 0) {
     const std::string first = absl::StrCat("g + ", layout.luma_groups);
-    absl::StrAppend(&out, "  for (int g = 0; g < chroma_groups; ++g) {\n", Interpolate(first, "1"),
+    absl::StrAppend(&out, "  g = 0;\n  do {\n", Interpolate(first, "1"),
                     Interpolate(absl::StrCat("g + ", layout.luma_groups + layout.chroma_groups), "2"),
                     BlendCodes(first, layout.btfel_texels()),
                     "    sum.y += dot(even1, even_codes) + dot(odd1, odd_codes);\n"
-                    "    sum.z += dot(even2, even_codes) + dot(odd2, odd_codes);\n  }\n");
+                    "    sum.z += dot(even2, even_codes) + dot(odd2, odd_codes);\n  } while (++g < ",
+                    layout.chroma_groups, ");\n");
   }
   absl::StrAppend(&out, R"(
   float scale = light.z < limits.x ? light.z / limits.x : 1.0;
-  return scale * (sum.x * texelFetch(codec_values, 1).xyz + sum.y * texelFetch(codec_values, 2).xyz +
-                  sum.z * texelFetch(codec_values, 3).xyz);
+  vec3 value = sum.x * texelFetch(codec_values, 1).xyz + sum.y * texelFetch(codec_values, 2).xyz +
+               sum.z * texelFetch(codec_values, 3).xyz;
+  return is_lit ? scale * value : vec3(0.0);
 }
-
-// One sum for each turn at hand, under the turned directions.
-vec3 BlendBtfels(ivec4 btfels, ivec4 turns, vec4 weights, int count, vec3 light, vec3 view) {
-  vec3 sum = vec3(0.0);
-  for (int turn = 0; turn < 4; ++turn) {
-    ivec4 group = ivec4(0);
-    vec4 group_weights = vec4(0.0);
-    int group_count = 0;
-    for (int n = 0; n < 4; ++n) {
-      if (n < count && turns[n] == turn) {
-        group[group_count] = btfels[n];
-        group_weights[group_count] = weights[n];
-        ++group_count;
-      }
-    }
-    for (int i = 0; i < min(group_count, 1); ++i) {
-      sum += BlendUnturned(group, group_weights, group_count, light, view);
-    }
-    light.xy = vec2(light.y, -light.x);
-    view.xy = vec2(view.y, -view.x);
-  }
-  return sum;
-}
-)");
+)",
+                  kUnturnedDirectionGlsl, kBlendByTurnGlsl);
   return out;
 }
 
@@ -227,17 +205,21 @@ void PackFactors(const DfmfDecoder& decoder, const BtfelTable& table, const Layo
         high = std::max(high, w);
       }
     }
-    constexpr float kMost = 65535.0F;
-    const float scale = (high - low) / kMost;
+    constexpr float kMost = 32767.0F;
+    const float scale = 0.5F * (high - low) / kMost;
+    const float middle = 0.5F * (high + low);
     const float inverse = scale > 0.0F ? 1.0F / scale : 0.0F;
-    glsl.shared_values[4 * (4 + g)] = scale;
-    glsl.shared_values[4 * (4 + g) + 1] = low;
+    float* const quantisation = &glsl.shared_values[4 * (4 + g)];
+    quantisation[0] = scale / 65536.0F;
+    quantisation[1] = scale;
+    quantisation[2] = middle;
     for (size_t pair = 0; pair < layout.num_pairs(); ++pair) {
       uint32_t* const words = glsl.shared_words.data() + (pair * groups.size() + g) * 4;
       for (int i = 0; i < group.count; ++i) {
         const float w = grid[pair * num_factors + group.factor + i] * table.step[group.coefficient + i];
-        const float code = std::clamp((w - low) * inverse + 0.5F, 0.0F, kMost);
-        words[i / 2] |= static_cast<uint32_t>(code) << (16 * (i % 2));
+        const float code = std::clamp(std::round((w - middle) * inverse), -kMost, kMost);
+        words[i / 2] |= static_cast<uint32_t>(static_cast<uint16_t>(static_cast<int>(code)))
+                        << (16 * (i % 2));
       }
     }
   }

@@ -5,6 +5,8 @@
 #include <bit>
 #include <cmath>
 #include <cstdint>
+#include <limits>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -12,12 +14,16 @@
 #include <absl/strings/str_format.h>
 
 #include "btf/base/status_macros.h"
+#include "btf/codec/turns_glsl.h"
 
 namespace tessera {
 namespace {
 
-constexpr int kMaxBasis = 49;       // l <= 6
-constexpr int kCodesPerTexel = 16;  // RGBA32UI
+constexpr int kMaxBasis = 49;      // l <= 6
+constexpr int kCodesPerTexel = 8;  // 16 bits each, of RGBA32UI
+constexpr int kMostCode = 32766;   // a rounding below what 16 bits hold
+// Coefficients that never exceed this share of the largest one are stored as coarsely as if they did.
+constexpr double kLeastShare = 1e-6;
 constexpr std::array<char, 4> kComponent = {'x', 'y', 'z', 'w'};
 
 // kl or kv from the shape of a basis table.
@@ -38,44 +44,26 @@ absl::StatusOr<int> BasisSize(const BtfelTable& table, const std::string& name) 
   return static_cast<int>(size);
 }
 
-// How the function of index l(l+1)+m changes under quarter turns t of the direction: the one of even m by a
-// sign, the one of odd m by a sign or, for odd t, into its partner (l, -m).
-enum class TurnClass { kSteady, kFlipped, kSwapped };  // |m| = 0, 2, odd modulo 4
-
 int OrderOf(int index) {
   const int l = static_cast<int>(std::sqrt(static_cast<double>(index)));
   return index - l * (l + 1);
 }
 
-TurnClass TurnClassOf(int index) {
-  const int m = std::abs(OrderOf(index));
-  return m % 2 == 1 ? TurnClass::kSwapped : m % 4 == 2 ? TurnClass::kFlipped : TurnClass::kSteady;
-}
-
-// The partner's index, and the sign it takes with one quarter turn.
-int PartnerOf(int index) {
-  return index - 2 * OrderOf(index);
-}
-int PartnerSign(int index) {
-  const int m = OrderOf(index);
-  return (std::abs(m) % 4 == 1) == (m > 0) ? 1 : -1;
-}
-
 enum class BasisForm {
   kPlain,    // the identity
-  kByOrder,  // each function mixes those of its own order m up to its degree, those of -m alike: they turn as
-             // the plain ones do
+  kByOrder,  // each function mixes those of its own order m up to its degree, those of -m alike
   kGeneral,
 };
 
 BasisForm FormOf(const CodecTable& basis, int size) {
+  const auto partner = [](int index) { return index - 2 * OrderOf(index); };  // of -m
   bool is_identity = true;
   for (int i = 0; i < size; ++i) {
     for (int j = 0; j < size; ++j) {
       const float value = basis.values[i * size + j];
       is_identity &= value == (i == j ? 1.0f : 0.0f);
       if (OrderOf(i) != OrderOf(j) || j > i ? value != 0.0f
-                                            : value != basis.values[PartnerOf(i) * size + PartnerOf(j)]) {
+                                            : value != basis.values[partner(i) * size + partner(j)]) {
         return BasisForm::kGeneral;
       }
     }
@@ -174,26 +162,25 @@ void AppendChangeOfBasis(const std::string& y, int size, int first, std::string*
 }
 
 // Where things lie in `codec_values`, in texels of four floats: the cosines and sines of the largest polar
-// angles; then for each view function j the steps and the offsets of its 3 kl codes; then the bases that are
-// not the identity.
+// angles; the scales of the light and of the view functions; then the bases that are not the identity.
 struct Layout {
   int kl = 0;
   int kv = 0;
   BasisForm light_form = BasisForm::kPlain;
   BasisForm view_form = BasisForm::kPlain;
 
-  [[nodiscard]] bool turns_like_plain() const {
-    return light_form != BasisForm::kGeneral && view_form != BasisForm::kGeneral;
-  }
-  [[nodiscard]] int row_codes() const { return 3 * kl; }
-  [[nodiscard]] int row_texels() const { return (row_codes() + 3) / 4; }
-  [[nodiscard]] int light_basis_begin() const { return 1 + kv * 2 * row_texels(); }
+  static constexpr int kLightScaleBegin = 1;
+  [[nodiscard]] int view_scale_begin() const { return kLightScaleBegin + Texels(kl); }
+  [[nodiscard]] int light_basis_begin() const { return view_scale_begin() + Texels(kv); }
   [[nodiscard]] int view_basis_begin() const { return light_basis_begin() + BasisTexels(light_form, kl); }
   [[nodiscard]] int num_texels() const { return view_basis_begin() + BasisTexels(view_form, kv); }
-  // Words of one BTFel: each view function's codes start at a texel of four words.
+  // A row: the codes of one view function, channel by channel.
+  [[nodiscard]] int row_codes() const { return 3 * kl; }
+  // Of one row of a BTFel; each starts at a texel.
   [[nodiscard]] int btfel_row_texels() const { return (row_codes() + kCodesPerTexel - 1) / kCodesPerTexel; }
 
  private:
+  static int Texels(int floats) { return (floats + 3) / 4; }
   static int BasisTexels(BasisForm form, int size) {
     switch (form) {
       case BasisForm::kPlain:
@@ -203,170 +190,113 @@ struct Layout {
         for (int n = static_cast<int>(std::lround(std::sqrt(size))); n > 0; --n) {
           entries += n * (n + 1) / 2;
         }
-        return (entries + 3) / 4;
+        return Texels(entries);
       }
       case BasisForm::kGeneral:
-        return size * ((size + 3) / 4);
+        return size * Texels(size);
     }
     return 0;
   }
 };
 
-// One weighted sum for BTFels of any turns. With y' = y(turned direction) and x = the partners with their
-// signs,
-//   y'_i = y_i (steady), e y_i (flipped), k y_i + s x_i (swapped),   e = 1 -1 1 -1, k = 1 0 -1 0, s = 0 1 0
-//   -1
-// by turn, so the codes are summed by class and the turn comes in once a row: tables and harmonics serve all.
+// y_i times the scale of function i.
+void AppendScales(const std::string& y, int size, int first, std::string* out) {
+  for (int i = 0; i < size; ++i) {
+    if (i % 4 == 0) {
+      absl::StrAppend(out, "    q = texelFetch(codec_values, ", first + i / 4, ");\n");
+    }
+    absl::StrAppend(out, "    ", y, "[", i, "] *= q.", std::string(1, kComponent[i % 4]), ";\n");
+  }
+}
+
+// BTFel by BTFel, each under its own unturned directions. The codes of a row are written out, so that
+// llvmpipe keeps what they need in registers; indexed by a loop they cost several times as much. Of a word's
+// two codes the lower stands 2^16 times too high and is summed apart, which saves moving it down.
 std::string Source(const Layout& layout) {
-  const auto component = [](int i) { return std::string(1, kComponent[i]); };
   std::string out;
   absl::StrAppend(&out, "uniform usamplerBuffer btfel_words;\nuniform samplerBuffer codec_values;\n");
   AppendHarmonics("LightHarmonics", layout.kl,
                   layout.light_form == BasisForm::kByOrder ? layout.light_basis_begin() : -1, &out);
   AppendHarmonics("ViewHarmonics", layout.kv,
                   layout.view_form == BasisForm::kByOrder ? layout.view_basis_begin() : -1, &out);
-  absl::StrAppend(&out, R"(
+  absl::StrAppend(&out, kUnturnedDirectionGlsl, R"(
 vec3 ClampPolar(vec3 d, float cosine, float sine) {
   return d.z < cosine ? vec3(d.xy * (sine / length(d.xy)), cosine) : d;
 }
 
-vec3 BlendTurned(ivec4 btfels, ivec4 turns, vec4 weights, int count, vec3 light, vec3 view) {
+vec3 BlendBtfels(ivec4 btfels, ivec4 turns, vec4 weights, int count, vec3 light, vec3 view) {
   vec4 q = texelFetch(codec_values, 0);
   float scale = light.z < q.x ? light.z / q.x : 1.0;
+  bool is_lit = light.z > 0.0 && view.z > 0.0 && count > 0;
+  light = ClampPolar(light, q.x, q.y);
+  view = ClampPolar(view, q.z, q.w);
+  vec3 sum = vec3(0.0);
+  int n = 0;
+  do {
 )");
-  // A loop of no rows, since llvmpipe leaves loops early but not functions.
-  absl::StrAppend(&out, "  int rows = light.z > 0.0 && view.z > 0.0 && count > 0 ? ", layout.kv, " : 0;\n",
-                  "  light = ClampPolar(light, q.x, q.y);\n  view = ClampPolar(view, q.z, q.w);\n",
-                  "  float yl[", layout.kl, "];\n  float yv[", layout.kv, "];\n",
-                  "  LightHarmonics(light, yl);\n  ViewHarmonics(view, yv);\n");
+  absl::StrAppend(&out, "    float yl[", layout.kl, "], yv[", layout.kv, "];\n",
+                  "    LightHarmonics(UnturnedDirection(light, turns[n]), yl);\n",
+                  "    ViewHarmonics(UnturnedDirection(view, turns[n]), yv);\n");
   if (layout.light_form == BasisForm::kGeneral) {
     AppendChangeOfBasis("yl", layout.kl, layout.light_basis_begin(), &out);
   }
   if (layout.view_form == BasisForm::kGeneral) {
     AppendChangeOfBasis("yv", layout.kv, layout.view_basis_begin(), &out);
   }
-  // The view's functions by class, (steady, flipped, k part, s part), since rows are counted by a loop.
-  absl::StrAppend(&out, "  vec4 classes[", layout.kv, "];\n");
-  for (int j = 0; j < layout.kv; ++j) {
-    const std::string value = absl::StrCat("yv[", j, "]");
-    absl::StrAppend(&out, "  classes[", j, "] = vec4(");
-    switch (TurnClassOf(j)) {
-      case TurnClass::kSteady:
-        absl::StrAppend(&out, value, ", 0.0, 0.0, 0.0);\n");
-        break;
-      case TurnClass::kFlipped:
-        absl::StrAppend(&out, "0.0, ", value, ", 0.0, 0.0);\n");
-        break;
-      case TurnClass::kSwapped:
-        absl::StrAppend(&out, "0.0, 0.0, ", value, ", ", PartnerSign(j) < 0 ? "-" : "", "yv[", PartnerOf(j),
-                        "]);\n");
-        break;
-    }
-  }
-  // The separable sum, view functions outermost: the light weights times the steps are made once a row and
-  // serve every BTFel; the offsets need no BTFel at all. The inner lists are written out, so that llvmpipe
-  // keeps them in registers; indexed by a loop they cost several times as much.
-  absl::StrAppend(
-      &out, "  vec3 sum = vec3(0.0);\n  for (int j = 0; j < rows; ++j) {\n    int table = 1 + j * ",
-      2 * layout.row_texels(), ";\n    float w[", layout.row_codes(), "], wx[", layout.row_codes(),
-      "];\n    vec3 o0 = vec3(0.0), o2 = vec3(0.0), ok = vec3(0.0), os = vec3(0.0);\n");
-  const auto partner = [&](int i) {
-    return absl::StrCat(PartnerSign(i) < 0 ? "-" : "", "yl[", PartnerOf(i), "]");
-  };
-  for (int texel = 0; texel < layout.row_texels(); ++texel) {
-    const int end = std::min(4 * texel + 4, layout.row_codes());
-    absl::StrAppend(&out, "    q = texelFetch(codec_values, table + ", texel, ");\n");
-    for (int n = 4 * texel; n < end; ++n) {
-      const int i = n % layout.kl;
-      absl::StrAppend(&out, "    w[", n, "] = q.", component(n % 4), " * yl[", i, "];\n");
-      if (TurnClassOf(i) == TurnClass::kSwapped) {
-        absl::StrAppend(&out, "    wx[", n, "] = q.", component(n % 4), " * ", partner(i), ";\n");
-      }
-    }
-    absl::StrAppend(&out, "    q = texelFetch(codec_values, table + ", layout.row_texels() + texel, ");\n");
-    for (int n = 4 * texel; n < end; ++n) {
-      const int i = n % layout.kl;
-      const std::string channel = component(n / layout.kl);
-      const std::string offset = absl::StrCat("q.", component(n % 4), " * ");
-      const TurnClass turn_class = TurnClassOf(i);
-      const char* into = turn_class == TurnClass::kSteady    ? "o0."
-                         : turn_class == TurnClass::kFlipped ? "o2."
-                                                             : "ok.";
-      absl::StrAppend(&out, "    ", into, channel, " += ", offset, "yl[", i, "];\n");
-      if (turn_class == TurnClass::kSwapped) {
-        absl::StrAppend(&out, "    os.", channel, " += ", offset, partner(i), ";\n");
-      }
-    }
-  }
-  absl::StrAppend(&out, R"(
-    for (int n = 0; n < count; ++n) {
-      vec3 a0 = o0, a2 = o2, ak = ok, as = os;
-      uvec4 u;
-      float f;
-)");
-  absl::StrAppend(&out, "      int first = (btfels[n] * ", layout.kv, " + j) * ", layout.btfel_row_texels(),
-                  ";\n");
+  AppendScales("yl", layout.kl, Layout::kLightScaleBegin, &out);
+  AppendScales("yv", layout.kv, layout.view_scale_begin(), &out);
+  absl::StrAppend(&out, "    int at = btfels[n] * ", layout.kv * layout.btfel_row_texels(),
+                  ", j = 0, rows = is_lit ? ", layout.kv, " : 1;\n    vec3 value = vec3(0.0);\n    do {\n",
+                  "      vec3 low = vec3(0.0), high = vec3(0.0);\n      uvec4 u;\n");
   for (int n = 0; n < layout.row_codes(); ++n) {
     if (n % kCodesPerTexel == 0) {
-      absl::StrAppend(&out, "      u = texelFetch(btfel_words, first + ", n / kCodesPerTexel, ");\n");
+      absl::StrAppend(&out, "      u = texelFetch(btfel_words, at + ", n / kCodesPerTexel, ");\n");
     }
-    const std::string channel = component(n / layout.kl);
-    // By way of int, which vector units convert in one instruction, unlike uint.
-    const std::string code =
-        absl::StrCat("float(int((u.", component((n % kCodesPerTexel) / 4), " >> ", 8 * (n % 4), ") & 255u))");
-    switch (TurnClassOf(n % layout.kl)) {
-      case TurnClass::kSteady:
-        absl::StrAppend(&out, "      a0.", channel, " += ", code, " * w[", n, "];\n");
-        break;
-      case TurnClass::kFlipped:
-        absl::StrAppend(&out, "      a2.", channel, " += ", code, " * w[", n, "];\n");
-        break;
-      case TurnClass::kSwapped:
-        absl::StrAppend(&out, "      f = ", code, "; ak.", channel, " += f * w[", n, "]; as.", channel,
-                        " += f * wx[", n, "];\n");
-        break;
-    }
+    const std::string word = absl::StrCat("u.", std::string(1, kComponent[n % kCodesPerTexel / 2]));
+    const std::string channel(1, kComponent[n / layout.kl]);
+    absl::StrAppend(&out,
+                    n % 2 == 0 ? absl::StrCat("      low.", channel, " += float(int(", word, " << 16))")
+                               : absl::StrCat("      high.", channel, " += float(int(", word, ") >> 16)"),
+                    " * yl[", n % layout.kl, "];\n");
   }
-  absl::StrAppend(&out, R"(
-      int turn = turns[n];
-      float e = (turn & 1) != 0 ? -1.0 : 1.0;
-      float k = turn == 0 ? 1.0 : turn == 2 ? -1.0 : 0.0;
-      float s = turn == 1 ? 1.0 : turn == 3 ? -1.0 : 0.0;
-      float y = dot(classes[j], vec4(1.0, e, k, s));
-      sum += (weights[n] * y) * (a0 + e * a2 + k * ak + s * as);
-    }
-  }
-  return scale * sum;
-}
-
-vec3 BlendBtfels(ivec4 btfels, ivec4 turns, vec4 weights, int count, vec3 light, vec3 view) {
-)");
-  if (layout.turns_like_plain()) {
-    absl::StrAppend(&out, "  return BlendTurned(btfels, turns, weights, count, light, view);\n}\n");
-    return out;
-  }
-  // Functions that do not turn into each other: one sum for each turn, under the turned directions.
-  absl::StrAppend(&out, R"(
-  vec3 sum = vec3(0.0);
-  for (int turn = 0; turn < 4; ++turn) {
-    ivec4 group = ivec4(0);
-    vec4 group_weights = vec4(0.0);
-    int group_count = 0;
-    for (int n = 0; n < 4; ++n) {
-      if (n < count && turns[n] == turn) {
-        group[group_count] = btfels[n];
-        group_weights[group_count] = weights[n];
-        ++group_count;
-      }
-    }
-    sum += BlendTurned(group, ivec4(0), group_weights, group_count, light, view);
-    light.xy = vec2(light.y, -light.x);
-    view.xy = vec2(view.y, -view.x);
-  }
-  return sum;
+  absl::StrAppend(&out, R"(      value += yv[j] * (low * 1.52587890625e-5 + high);
+      at += )",
+                  layout.btfel_row_texels(), R"(;
+    } while (++j < rows);
+    sum += weights[n] * value;
+  } while (++n < count);
+  return is_lit ? scale * sum : vec3(0.0);
 }
 )");
   return out;
+}
+
+// Factors a_i and b_j, the products of which are at least `least`[i * kv + j] > 0 and not much above: the
+// logarithms are a mean over j, then what remains, each as low as the other allows.
+void CoverByProducts(const std::vector<double>& least, int kl, int kv, std::span<float> a,
+                     std::span<float> b) {
+  std::vector<double> log_a(kl, 0.0);
+  std::vector<double> log_b(kv, -std::numeric_limits<double>::infinity());
+  for (int i = 0; i < kl; ++i) {
+    for (int j = 0; j < kv; ++j) {
+      log_a[i] += std::log(least[i * kv + j]) / kv;
+    }
+  }
+  for (int i = 0; i < kl; ++i) {
+    for (int j = 0; j < kv; ++j) {
+      log_b[j] = std::max(log_b[j], std::log(least[i * kv + j]) - log_a[i]);
+    }
+  }
+  for (int i = 0; i < kl; ++i) {
+    double lowest = -std::numeric_limits<double>::infinity();
+    for (int j = 0; j < kv; ++j) {
+      lowest = std::max(lowest, std::log(least[i * kv + j]) - log_b[j]);
+    }
+    a[i] = static_cast<float>(std::exp(lowest));
+  }
+  for (int j = 0; j < kv; ++j) {
+    b[j] = static_cast<float>(std::exp(log_b[j]));
+  }
 }
 
 void CopyBasis(const CodecTable& basis, int size, BasisForm form, int first_texel,
@@ -418,33 +348,70 @@ absl::StatusOr<CodecGlsl> DshGlsl(const BtfelTable& table) {
   glsl.shared_values[2] = static_cast<float>(std::cos(view_theta));
   glsl.shared_values[3] = static_cast<float>(std::sin(view_theta));
 
-  // Code n of row j is coefficient (channel kv + j) kl + i with n = channel kl + i.
-  const int row_codes = layout.row_codes();
-  const auto coefficient = [&](int j, int n) {
-    return (static_cast<size_t>(n / layout.kl) * layout.kv + j) * layout.kl + n % layout.kl;
-  };
-  for (int j = 0; j < layout.kv; ++j) {
-    float* row = glsl.shared_values.data() + 4 * (1 + static_cast<ptrdiff_t>(j) * 2 * layout.row_texels());
-    for (int n = 0; n < row_codes; ++n) {
-      row[n] = table.step[coefficient(j, n)];
-      row[4 * layout.row_texels() + n] = table.offset[coefficient(j, n)];
+  std::vector<uint8_t> lowest(k, 255);
+  std::vector<uint8_t> highest(k, 0);
+  for (size_t btfel = 0; btfel < table.size(); ++btfel) {
+    const uint8_t* const codes = table.codes.data() + btfel * k;
+    for (size_t n = 0; n < k; ++n) {
+      lowest[n] = std::min(lowest[n], codes[n]);
+      highest[n] = std::max(highest[n], codes[n]);
     }
   }
+  // The scales: no coefficient's value exceeds the largest code times those of its functions.
+  const auto coefficient = [&](int channel, int j, int i) {
+    return (channel * layout.kv + j) * layout.kl + i;
+  };
+  std::vector<double> largest(static_cast<size_t>(layout.kl) * layout.kv, 0.0);
+  for (int i = 0; i < layout.kl; ++i) {
+    for (int j = 0; j < layout.kv; ++j) {
+      for (int channel = 0; channel < 3; ++channel) {
+        const int n = coefficient(channel, j, i);
+        for (const uint8_t code : {lowest[n], highest[n]}) {
+          const double value = table.offset[n] + static_cast<double>(table.step[n]) * code;
+          largest[i * layout.kv + j] = std::max(largest[i * layout.kv + j], std::abs(value));
+        }
+      }
+    }
+  }
+  const double most = *std::ranges::max_element(largest);
+  for (double& value : largest) {
+    value = most > 0.0 ? std::max(value, kLeastShare * most) / kMostCode : 1.0;
+  }
+  const std::span<float> values(glsl.shared_values);
+  const std::span<float> light_scale = values.subspan(4 * Layout::kLightScaleBegin, layout.kl);
+  const std::span<float> view_scale = values.subspan(4 * layout.view_scale_begin(), layout.kv);
+  CoverByProducts(largest, layout.kl, layout.kv, light_scale, view_scale);
   CopyBasis(basis_light, layout.kl, layout.light_form, layout.light_basis_begin(), &glsl.shared_values);
   CopyBasis(basis_view, layout.kv, layout.view_form, layout.view_basis_begin(), &glsl.shared_values);
 
-  // The codes of a channel and row lie together on both sides. Byte n % 4 of word n / 4 is its bits from
-  // 8 (n % 4) on: on the little-endian machines that this is for, bytes in order.
+  std::vector<float> step(k);
+  std::vector<float> offset(k);  // and what makes the conversion to int round down, then to the nearest
+  for (int channel = 0; channel < 3; ++channel) {
+    for (int j = 0; j < layout.kv; ++j) {
+      for (int i = 0; i < layout.kl; ++i) {
+        const int n = coefficient(channel, j, i);
+        const double scale = static_cast<double>(light_scale[i]) * view_scale[j];
+        step[n] = static_cast<float>(table.step[n] / scale);
+        offset[n] = static_cast<float>(table.offset[n] / scale + kMostCode + 0.5);
+      }
+    }
+  }
+  // Code n of a row is bits 16 (n % 2) and on of word n / 2: on the little-endian machines that this is for,
+  // 16-bit numbers in order.
   static_assert(std::endian::native == std::endian::little);
   const int row_words = layout.btfel_row_texels() * 4;
   glsl.words_per_btfel = layout.kv * row_words;
   glsl.btfel_words.resize(table.size() * glsl.words_per_btfel);
-  auto* bytes = reinterpret_cast<uint8_t*>(glsl.btfel_words.data());
+  auto* row = reinterpret_cast<int16_t*>(glsl.btfel_words.data());
   for (size_t btfel = 0; btfel < table.size(); ++btfel) {
     const uint8_t* const codes = table.codes.data() + btfel * k;
-    for (int j = 0; j < layout.kv; ++j, bytes += 4 * static_cast<ptrdiff_t>(row_words)) {
+    for (int j = 0; j < layout.kv; ++j, row += 2 * static_cast<ptrdiff_t>(row_words)) {
       for (int channel = 0; channel < 3; ++channel) {
-        std::copy_n(codes + coefficient(j, channel * layout.kl), layout.kl, bytes + channel * layout.kl);
+        const int first = coefficient(channel, j, 0);
+        for (int i = 0; i < layout.kl; ++i) {
+          const float code = offset[first + i] + step[first + i] * static_cast<float>(codes[first + i]);
+          row[channel * layout.kl + i] = static_cast<int16_t>(static_cast<int>(code) - kMostCode);
+        }
       }
     }
   }

@@ -10,6 +10,7 @@
 #include <absl/strings/str_cat.h>
 
 #include "btf/base/status_macros.h"
+#include "btf/codec/turns_glsl.h"
 #include "btf/codec/view_pca/view_pca_decoder.h"
 
 namespace tessera {
@@ -65,7 +66,7 @@ void Locate(vec3 d, vec2 limit, int cells, out ivec3 index, out vec3 weight) {
   float best = 1e30;
   index = ivec3(0);
   weight = vec3(1.0, 0.0, 0.0);
-  for (; entry < end && best > 0.0; ++entry) {
+  do {
     int triangle = int(texelFetch(codec_values, entry).x);
     q = texelFetch(codec_values, triangle);
     vec2 a = q.xy - p, b = q.zw - p;
@@ -84,7 +85,7 @@ void Locate(vec3 d, vec2 limit, int cells, out ivec3 index, out vec3 weight) {
     }
     q = texelFetch(codec_values, triangle + 2);
     index = best < before ? ivec3(q.xyz) : index;
-  }
+  } while (++entry < end && best > 0.0);
 }
 
 // BTFels of no turn.
@@ -99,12 +100,12 @@ vec3 BlendUnturned(ivec4 btfels, vec4 weights, int count, vec3 light, vec3 view)
   Locate(view, limits.zw, int(q.y), view_index, view_weight);
   q = texelFetch(codec_values, 2);
   int weights_begin = int(q.x), quantisation_begin = int(q.y);
-  // A loop of no corners, since llvmpipe leaves loops early but not functions.
-  int corners = light.z > 0.0 && view.z > 0.0 ? 3 : 0;
+  bool is_lit = light.z > 0.0 && view.z > 0.0;
+  int corners = is_lit ? 3 : 1, s = 0;
   vec3 sum = vec3(0.0);
-  for (int s = 0; s < corners; ++s) {
+  do {
     int v = view_index[s];
-    int taps = view_weight[s] > 0.0 ? count : 0;
+    int n = 0;
 )");
   // The weights of the mean and the eigen-textures under this light, then times the steps.
   absl::StrAppend(&out, "    float w[", layout.view_codes(), "];\n    vec3 offset = vec3(0.0);\n    vec4 ",
@@ -136,45 +137,22 @@ vec3 BlendUnturned(ivec4 btfels, vec4 weights, int count, vec3 light, vec3 view)
                       weight_of(n), ";\n");
     }
   }
-  absl::StrAppend(&out,
-                  "    for (int n = 0; n < taps; ++n) {\n      int first = (btfels[n] * num_views + v) * ",
+  absl::StrAppend(&out, "    do {\n      int first = (btfels[n] * num_views + v) * ",
                   layout.btfel_view_texels(), ";\n      vec3 value = offset;\n      uvec4 u;\n");
   for (int n = 0; n < layout.view_codes(); ++n) {
     if (n % kCodesPerTexel == 0) {
       absl::StrAppend(&out, "      u = texelFetch(btfel_words, first + ", n / kCodesPerTexel, ");\n");
     }
-    absl::StrAppend(&out, "      value.", component(n / (layout.c + 1)), " += float((u.",
-                    component(n % kCodesPerTexel / 4), " >> ", 8 * (n % 4), ") & 255u) * w[", n, "];\n");
+    absl::StrAppend(&out, "      value.", component(n / (layout.c + 1)), " += float(int(u.",
+                    component(n % kCodesPerTexel / 4), " >> ", 8 * (n % 4), ") & 255) * w[", n, "];\n");
   }
   absl::StrAppend(&out, R"(      sum += (weights[n] * view_weight[s]) * value;
-    }
-  }
-  return scale * sum;
+    } while (++n < count);
+  } while (++s < corners);
+  return is_lit ? scale * sum : vec3(0.0);
 }
-
-// Under the turned directions, one group of BTFels for each turn.
-vec3 BlendBtfels(ivec4 btfels, ivec4 turns, vec4 weights, int count, vec3 light, vec3 view) {
-  vec3 sum = vec3(0.0);
-  for (int turn = 0; turn < 4; ++turn) {
-    ivec4 group = ivec4(0);
-    vec4 group_weights = vec4(0.0);
-    int group_count = 0;
-    for (int n = 0; n < 4; ++n) {
-      if (n < count && turns[n] == turn) {
-        group[group_count] = btfels[n];
-        group_weights[group_count] = weights[n];
-        ++group_count;
-      }
-    }
-    for (int once = 0; once < min(group_count, 1); ++once) {
-      sum += BlendUnturned(group, group_weights, group_count, light, view);
-    }
-    light.xy = vec2(light.y, -light.x);
-    view.xy = vec2(view.y, -view.x);
-  }
-  return sum;
-}
-)");
+)",
+                  kUnturnedDirectionGlsl, kBlendByTurnGlsl);
   return out;
 }
 

@@ -66,8 +66,8 @@ void main() {
     }
     packed.push_back(0.0f);
   }
-  const GlBuffer words(gl), values(gl), inputs(gl);
-  const GlTexture words_texture(gl), values_texture(gl), inputs_texture(gl), pixels(gl);
+  const GlBuffer words(gl), values(gl), packed_values(gl), inputs(gl);
+  const GlTexture words_texture(gl), values_texture(gl), packed_texture(gl), inputs_texture(gl), pixels(gl);
   const GlFramebuffer target(gl);
   const GlVertexArray no_vertices(gl);
   gl.UseProgram(*program);
@@ -84,6 +84,10 @@ void main() {
        GL_RGBA32UI);
   fill(1, "codec_values", values, values_texture, glsl.shared_values.size() * 4, glsl.shared_values.data(),
        GL_RGBA32F);
+  if (!glsl.shared_words.empty()) {
+    fill(4, "codec_words", packed_values, packed_texture, glsl.shared_words.size() * 4,
+         glsl.shared_words.data(), GL_RGBA32UI);
+  }
   fill(2, "queries", inputs, inputs_texture, packed.size() * 4, packed.data(), GL_RGBA32F);
   const auto width = static_cast<GLsizei>(queries.size());
   gl.ActiveTexture(GL_TEXTURE3);

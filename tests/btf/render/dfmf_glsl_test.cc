@@ -1,0 +1,89 @@
+#include "btf/codec/dfmf/dfmf_glsl.h"
+
+#include <gtest/gtest.h>
+
+#include "btf/render/preview.h"
+#include "btf/render/reference.h"
+#include "tests/btf/codec/synthetic_btf.h"
+#include "tests/btf/render/blend_queries.h"
+#include "tests/btf/render/hand_made.h"
+
+namespace tessera {
+namespace {
+
+SampledBtf Shiny() {
+  return ShinyBtf(8, 6, RingDirections(4, 9), RingDirections(4, 12, 60.0));
+}
+
+BtfelTable Encoded(BtfSource& btf, int rank) {
+  return FindCodec("dfmf")->Encode(btf, {.rank = rank}, {})->btfels;
+}
+
+// Each factor is off by half a step of its 16 bits, whose range is that of the largest of eight, and is
+// multiplied by codes of up to 255: 255 * 2^-16 / 255 of about 1 for the first component, less for the rest.
+constexpr double kTolerance = 6e-5;
+
+TEST(DfmfGlslTest, BlendsWhatTheDecoderBlends) {
+  SampledBtf btf = Shiny();
+  // Ranks within one group of eight, at its end, and of several groups.
+  for (const int rank : {1, 3, 8, 13, 30, 48}) {
+    const BtfelTable table = Encoded(btf, rank);
+    const auto glsl = DfmfGlsl(table);
+    ASSERT_TRUE(glsl.ok()) << glsl.status();
+    SCOPED_TRACE(rank);
+    testing::ExpectBlendsWhatTheDecoderBlends(table, *glsl, kTolerance);
+  }
+}
+
+TEST(DfmfGlslTest, BlendsGreyTexelsWithoutChrominance) {
+  SampledBtf btf = Shiny();
+  for (int n = 0; n < 48; ++n) {
+    for (size_t v = 0; v < btf.info().views.size(); ++v) {
+      for (size_t l = 0; l < btf.info().lights.size(); ++l) {
+        btf.at(n % 8, n / 8, 1, v, l) = btf.at(n % 8, n / 8, 0, v, l);
+        btf.at(n % 8, n / 8, 2, v, l) = btf.at(n % 8, n / 8, 0, v, l);
+      }
+    }
+  }
+  const BtfelTable table = Encoded(btf, 9);
+  ASSERT_FALSE(table.tables.contains("chroma"));
+  const auto glsl = DfmfGlsl(table);
+  ASSERT_TRUE(glsl.ok()) << glsl.status();
+  testing::ExpectBlendsWhatTheDecoderBlends(table, *glsl, kTolerance);
+}
+
+TEST(DfmfGlslTest, PreviewsAsTheReferenceDoes) {
+  const Dressing dressing = testing::RandomDressing(testing::SkewedGrid(4, 0.3, 7), 8);
+  SampledBtf btf = Shiny();
+  const TileSet tile_set = testing::RandomTileSet(Encoded(btf, 20), 16, 3);
+  PreviewScene scene{.dressing = &dressing, .tile_set = &tile_set, .width = 160, .height = 120};
+  scene.camera.eye = {0.6, -1.3, 1.8};
+  scene.camera.fov_y_rad = RadFromDeg(60.0);
+  scene.lights.push_back({.kind = Light::Kind::kPoint, .place = {-0.5, 0.2, 1.0}});
+  const auto context = CreateOsmesaContext();
+  ASSERT_TRUE(context.ok()) << context.status();
+  for (const Filter filter : {Filter::kBilinear, Filter::kNearest}) {
+    scene.filter = filter;
+    const auto image = RenderGl(**context, scene, {});
+    ASSERT_TRUE(image.ok()) << image.status();
+    const auto reference = RenderReferenceWithDepth(scene, {});
+    ASSERT_TRUE(reference.ok()) << reference.status();
+    const testing::Comparison comparison = testing::CompareAwayFromSilhouettes(*image, *reference);
+    EXPECT_LT(comparison.rmse, 1.0 / 255.0);
+    EXPECT_LT(comparison.differing, 0.01);
+    EXPECT_GT(comparison.pixels, 160U * 120 / 20);
+  }
+}
+
+TEST(DfmfGlslTest, RefusesTablesThatDoNotFit) {
+  SampledBtf btf = Shiny();
+  BtfelTable table = Encoded(btf, 5);
+  table.tables.erase("luma");
+  EXPECT_EQ(DfmfGlsl(table).status().code(), absl::StatusCode::kInvalidArgument);
+  table = Encoded(btf, 5);
+  table.codes.pop_back();
+  EXPECT_EQ(DfmfGlsl(table).status().code(), absl::StatusCode::kInvalidArgument);
+}
+
+}  // namespace
+}  // namespace tessera
