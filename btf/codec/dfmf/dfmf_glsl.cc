@@ -4,31 +4,33 @@
 #include <cmath>
 #include <limits>
 #include <memory>
+#include <span>
 #include <string>
+#include <vector>
 
 #include <absl/strings/str_cat.h>
 #include <absl/strings/substitute.h>
 
 #include "btf/base/status_macros.h"
+#include "btf/codec/coefficient_range.h"
 #include "btf/codec/dfmf/dfmf_decoder.h"
 #include "btf/codec/turns_glsl.h"
 
 namespace tessera {
 namespace {
 
-// Factors, and codes, that one step of the shader's loops takes: one texel of 16-bit factors, half a texel of
-// 8-bit codes.
+// Factors, and codes, that one step of the shader's loops takes: one texel of 16-bit numbers.
 constexpr int kGroup = 8;
-constexpr int kCodesPerTexel = 16;
+constexpr float kMostCode = 32767.0F;
 
 int Groups(int count) {
   return (count + kGroup - 1) / kGroup;
 }
 
-// Where things lie. `codec_values`: the limits, the three colour axes, for each group the
-// scales of even and of odd factors and their offset, then
-// for each pair of nodes what the coefficients' offsets contribute to the three components. `codec_words`:
-// for each pair of nodes a texel for each group, luminance first, then either chrominance.
+// Where things lie. `codec_values`: the limits, the three colour axes, then for each group the scales of even
+// and of odd factors and their offsets. `codec_words`: for each pair of nodes a texel for each group,
+// luminance first, then either chrominance. `btfel_words`: for each BTFel a texel for each group of
+// coefficients.
 struct Layout {
   int luma_groups = 0;
   int chroma_groups = 0;
@@ -42,13 +44,10 @@ struct Layout {
         view_nodes(decoder.view_grid().nodes_per_side()) {}
 
   [[nodiscard]] int num_groups() const { return luma_groups + 2 * chroma_groups; }
-  [[nodiscard]] int pairs_begin() const { return 4 + num_groups(); }
   [[nodiscard]] size_t num_pairs() const {
     return static_cast<size_t>(light_nodes) * light_nodes * view_nodes * view_nodes;
   }
-  [[nodiscard]] int btfel_texels() const {
-    return ((luma_groups + chroma_groups) * kGroup + kCodesPerTexel - 1) / kCodesPerTexel;
-  }
+  [[nodiscard]] int btfel_texels() const { return luma_groups + chroma_groups; }
 };
 
 constexpr char kHead[] = R"(
@@ -92,21 +91,19 @@ std::string Interpolate(const std::string& group, const std::string& suffix) {
   }
   absl::StrAppend(&out,
                   absl::Substitute("    q = texelFetch(codec_values, 4 + $0);\n    even$1 = even$1 * q.x "
-                                   "+ q.z; odd$1 = odd$1 * q.y + q.z;\n",
+                                   "+ q.z; odd$1 = odd$1 * q.y + q.w;\n",
                                    group, suffix));
   return out;
 }
 
-// The weighted sum of the BTFels' codes in code group `group`, in `low` and `high`: codes 0 2 4 6 and 1 3 5
-// 7, as the factors.
+// The weighted sum of the BTFels' codes in group `group`.
 std::string BlendCodes(const std::string& group, int btfel_texels) {
   return absl::Substitute(R"(    vec4 even_codes = vec4(0.0), odd_codes = vec4(0.0);
     n = 0;
     do {
-      u = texelFetch(btfel_words, btfels[n] * $1 + (($0) >> 1));
-      uvec2 c = (($0) & 1) == 0 ? u.xy : u.zw;
-      even_codes += weights[n] * vec4(ivec4(c.x, c.x >> 16, c.y, c.y >> 16) & 255);
-      odd_codes += weights[n] * vec4(ivec4(c.x >> 8, c.x >> 24, c.y >> 8, c.y >> 24) & 255);
+      u = texelFetch(btfel_words, btfels[n] * $1 + $0);
+      even_codes += weights[n] * Low(u);
+      odd_codes += weights[n] * High(u);
     } while (++n < count);
 )",
                           group, btfel_texels);
@@ -123,7 +120,6 @@ vec3 BlendUnturned(ivec4 btfels, vec4 weights, int count, vec3 light, vec3 view)
   vec3 light_weights, view_weights;
   FindNodes(light, limits.y, $0, light_nodes, light_weights);
   FindNodes(view, limits.z, $1, view_nodes, view_weights);
-  float total = dot(weights, vec4(1.0));
   ivec3 pairs0 = light_nodes.x * $2 + view_nodes, pairs1 = light_nodes.y * $2 + view_nodes;
   ivec3 pairs2 = light_nodes.z * $2 + view_nodes;
   vec3 pair0 = light_weights.x * view_weights, pair1 = light_weights.y * view_weights;
@@ -131,14 +127,6 @@ vec3 BlendUnturned(ivec4 btfels, vec4 weights, int count, vec3 light, vec3 view)
   vec3 sum = vec3(0.0);
 )",
                              layout.light_nodes, layout.view_nodes, layout.view_nodes * layout.view_nodes));
-  for (int i = 0; i < 3; ++i) {
-    for (int j = 0; j < 3; ++j) {
-      absl::StrAppend(
-          &out, absl::Substitute("  sum += pair$0[$1] * texelFetch(codec_values, $2 + pairs$0[$1]).xyz;\n", i,
-                                 j, layout.pairs_begin()));
-    }
-  }
-  absl::StrAppend(&out, "  sum *= total;\n");
   for (int i = 0; i < 3; ++i) {
     absl::StrAppend(&out, absl::Substitute("  ivec3 words$0 = pairs$0 * $1;\n", i, layout.num_groups()));
   }
@@ -166,6 +154,11 @@ vec3 BlendUnturned(ivec4 btfels, vec4 weights, int count, vec3 light, vec3 view)
   return out;
 }
 
+// The nearest signed code, as the low half of a word.
+uint32_t Code16(float value) {
+  return static_cast<uint16_t>(static_cast<int>(std::clamp(std::round(value), -kMostCode, kMostCode)));
+}
+
 // Factors of one group in the order of the table: the first, their number, the first coefficient they
 // multiply.
 struct Group {
@@ -189,7 +182,9 @@ std::vector<Group> GroupsOf(const DfmfDecoder& decoder) {
   return groups;
 }
 
-void PackFactors(const DfmfDecoder& decoder, const BtfelTable& table, const Layout& layout, CodecGlsl& glsl) {
+// `scales`: what one step of each coefficient's 16-bit code is worth.
+void PackFactors(const DfmfDecoder& decoder, std::span<const float> scales, const Layout& layout,
+                 CodecGlsl& glsl) {
   const std::span<const float> grid = decoder.grid();
   const int num_factors = decoder.num_factors();
   const std::vector<Group> groups = GroupsOf(decoder);
@@ -200,44 +195,26 @@ void PackFactors(const DfmfDecoder& decoder, const BtfelTable& table, const Layo
     float high = -low;
     for (size_t pair = 0; pair < layout.num_pairs(); ++pair) {
       for (int i = 0; i < group.count; ++i) {
-        const float w = grid[pair * num_factors + group.factor + i] * table.step[group.coefficient + i];
+        const float w = grid[pair * num_factors + group.factor + i] * scales[group.coefficient + i];
         low = std::min(low, w);
         high = std::max(high, w);
       }
     }
-    constexpr float kMost = 32767.0F;
-    const float scale = 0.5F * (high - low) / kMost;
+    const float scale = 0.5F * (high - low) / kMostCode;
     const float middle = 0.5F * (high + low);
     const float inverse = scale > 0.0F ? 1.0F / scale : 0.0F;
     float* const quantisation = &glsl.shared_values[4 * (4 + g)];
-    quantisation[0] = scale / 65536.0F;
+    // Even codes, of factors and of BTFels, stand 2^16 times too high.
+    quantisation[0] = scale / 65536.0F / 65536.0F;
     quantisation[1] = scale;
-    quantisation[2] = middle;
+    quantisation[2] = middle / 65536.0F;
+    quantisation[3] = middle;
     for (size_t pair = 0; pair < layout.num_pairs(); ++pair) {
       uint32_t* const words = glsl.shared_words.data() + (pair * groups.size() + g) * 4;
       for (int i = 0; i < group.count; ++i) {
-        const float w = grid[pair * num_factors + group.factor + i] * table.step[group.coefficient + i];
-        const float code = std::clamp(std::round((w - middle) * inverse), -kMost, kMost);
-        words[i / 2] |= static_cast<uint32_t>(static_cast<uint16_t>(static_cast<int>(code)))
-                        << (16 * (i % 2));
+        const float w = grid[pair * num_factors + group.factor + i] * scales[group.coefficient + i];
+        words[i / 2] |= Code16((w - middle) * inverse) << (16 * (i % 2));
       }
-    }
-  }
-  // What the offsets contribute, whatever the codes.
-  const int r = decoder.luma_rank();
-  const int q = decoder.chroma_rank();
-  for (size_t pair = 0; pair < layout.num_pairs(); ++pair) {
-    const float* const w = grid.data() + pair * num_factors;
-    double sums[3] = {0.0, 0.0, 0.0};
-    for (int i = 0; i < r; ++i) {
-      sums[0] += static_cast<double>(w[i]) * table.offset[i];
-    }
-    for (int i = 0; i < q; ++i) {
-      sums[1] += static_cast<double>(w[r + i]) * table.offset[r + i];
-      sums[2] += static_cast<double>(w[r + q + i]) * table.offset[r + i];
-    }
-    for (int j = 0; j < 3; ++j) {
-      glsl.shared_values[4 * (layout.pairs_begin() + pair) + j] = static_cast<float>(sums[j]);
     }
   }
 }
@@ -254,7 +231,7 @@ absl::StatusOr<CodecGlsl> DfmfGlsl(const BtfelTable& table) {
   const Layout layout(*decoder);
   CodecGlsl glsl;
   glsl.source = Source(layout);
-  glsl.shared_values.resize(4 * (layout.pairs_begin() + layout.num_pairs()));
+  glsl.shared_values.resize(4 * static_cast<size_t>(4 + layout.num_groups()));
   glsl.shared_values[0] = static_cast<float>(std::cos(decoder->max_light_theta_rad()));
   glsl.shared_values[1] = static_cast<float>(1.0 / decoder->light_grid().covered_rad());
   glsl.shared_values[2] = static_cast<float>(1.0 / decoder->view_grid().covered_rad());
@@ -263,7 +240,10 @@ absl::StatusOr<CodecGlsl> DfmfGlsl(const BtfelTable& table) {
       glsl.shared_values[4 * (1 + j) + channel] = static_cast<float>(decoder->colour()(channel, j));
     }
   }
-  PackFactors(*decoder, table, layout, glsl);
+  std::vector<float> scales(k);
+  std::ranges::transform(LargestMagnitudes(table), scales.begin(),
+                         [](double largest) { return static_cast<float>(largest) / kMostCode; });
+  PackFactors(*decoder, scales, layout, glsl);
 
   glsl.words_per_btfel = layout.btfel_texels() * 4;
   glsl.btfel_words.resize(table.size() * glsl.words_per_btfel);
@@ -273,7 +253,9 @@ absl::StatusOr<CodecGlsl> DfmfGlsl(const BtfelTable& table) {
     uint32_t* const words = glsl.btfel_words.data() + btfel * glsl.words_per_btfel;
     for (size_t i = 0; i < k; ++i) {
       const size_t place = i < r ? i : static_cast<size_t>(layout.luma_groups) * kGroup + (i - r);
-      words[place / 4] |= static_cast<uint32_t>(codes[i]) << (8 * (place % 4));
+      const float value = table.offset[i] + table.step[i] * static_cast<float>(codes[i]);
+      const float code = scales[i] > 0.0F ? value / scales[i] : 0.0F;
+      words[place / 2] |= Code16(code) << (16 * (place % 2));
     }
   }
   return glsl;

@@ -9,9 +9,10 @@
 namespace tessera {
 
 // The source depends only on the ranks and the grids' sizes, so that a compiled program serves many
-// materials. Factors at pairs of nodes, times their coefficient's step, are packed to 16 bits with one scale
-// for eight of them: their error is at most 2^-16 of the largest contribution of any of the eight. Errors:
-// INVALID_ARGUMENT naming the table or parameter that is missing or misshapen.
+// materials. Packed to 16 bits: coefficients with their offsets folded in, to 2^-16 of the largest magnitude
+// of each; factors at pairs of nodes, times that magnitude, with one scale for eight of them, to 2^-16 of the
+// largest contribution of any of the eight. Errors: INVALID_ARGUMENT naming the table or parameter that is
+// missing or misshapen.
 [[nodiscard]] absl::StatusOr<CodecGlsl> DfmfGlsl(const BtfelTable& table);
 
 }  // namespace tessera

@@ -14,6 +14,7 @@
 #include <absl/strings/str_format.h>
 
 #include "btf/base/status_macros.h"
+#include "btf/codec/coefficient_range.h"
 #include "btf/codec/turns_glsl.h"
 
 namespace tessera {
@@ -348,28 +349,17 @@ absl::StatusOr<CodecGlsl> DshGlsl(const BtfelTable& table) {
   glsl.shared_values[2] = static_cast<float>(std::cos(view_theta));
   glsl.shared_values[3] = static_cast<float>(std::sin(view_theta));
 
-  std::vector<uint8_t> lowest(k, 255);
-  std::vector<uint8_t> highest(k, 0);
-  for (size_t btfel = 0; btfel < table.size(); ++btfel) {
-    const uint8_t* const codes = table.codes.data() + btfel * k;
-    for (size_t n = 0; n < k; ++n) {
-      lowest[n] = std::min(lowest[n], codes[n]);
-      highest[n] = std::max(highest[n], codes[n]);
-    }
-  }
   // The scales: no coefficient's value exceeds the largest code times those of its functions.
   const auto coefficient = [&](int channel, int j, int i) {
     return (channel * layout.kv + j) * layout.kl + i;
   };
+  const std::vector<double> magnitudes = LargestMagnitudes(table);
   std::vector<double> largest(static_cast<size_t>(layout.kl) * layout.kv, 0.0);
   for (int i = 0; i < layout.kl; ++i) {
     for (int j = 0; j < layout.kv; ++j) {
       for (int channel = 0; channel < 3; ++channel) {
-        const int n = coefficient(channel, j, i);
-        for (const uint8_t code : {lowest[n], highest[n]}) {
-          const double value = table.offset[n] + static_cast<double>(table.step[n]) * code;
-          largest[i * layout.kv + j] = std::max(largest[i * layout.kv + j], std::abs(value));
-        }
+        largest[i * layout.kv + j] =
+            std::max(largest[i * layout.kv + j], magnitudes[coefficient(channel, j, i)]);
       }
     }
   }
