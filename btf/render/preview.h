@@ -54,14 +54,41 @@ struct PreviewScene {
 // A camera that sees all of the mesh, from the front and a little above.
 [[nodiscard]] Camera FramingCamera(const QuadMesh& mesh, int width, int height);
 
+// Pictures of one tile set on one dressing: its BTFels and the codec's tables stay in the context, so that
+// each picture costs only its drawing. One thread at a time; not while another uses the context.
+class GlPreview {
+ public:
+  // The context, the dressing and the tile set must outlive it, unchanged. Cost: packing and copying the
+  // BTFels, and what the codec makes of its tables; preview_bench prints it. Errors: INVALID_ARGUMENT (mesh,
+  // codec's tables), FAILED_PRECONDITION (arrangements differ), UNIMPLEMENTED (codec unknown),
+  // RESOURCE_EXHAUSTED (tables beyond what GL holds), INTERNAL (GL).
+  [[nodiscard]] static absl::StatusOr<std::unique_ptr<GlPreview>> Create(OffscreenContext& context,
+                                                                         const Dressing& dressing,
+                                                                         const TileSet& tile_set);
+  ~GlPreview();
+  GlPreview(const GlPreview&) = delete;
+  GlPreview& operator=(const GlPreview&) = delete;
+
+  // As RenderGl. Errors: also INVALID_ARGUMENT when the scene shows another dressing or tile set. The first
+  // picture of a codec's size on a context also compiles its shaders.
+  [[nodiscard]] absl::StatusOr<Image> Render(const PreviewScene& scene, const RunContext& run_context);
+
+  class Resources;
+
+ private:
+  GlPreview(OffscreenContext& context, std::unique_ptr<Resources> resources);
+
+  OffscreenContext& context_;
+  std::unique_ptr<Resources> resources_;
+};
+
 // Linear RGBA, not premultiplied: alpha is the share of the pixel's four samples that the mesh covers, RGB
 // the mean over those; radiance = sum over lights of value * irradiance / pi (CompositeOver in composite.h
 // sets it before a background). Depth-tested; filtered as preview_scene.h and surface.h say; the back of a
 // face is black. Errors: INVALID_ARGUMENT (sizes, camera, lights, mesh, named with value and limit),
 // FAILED_PRECONDITION (arrangements differ), UNIMPLEMENTED (codec without GLSL), RESOURCE_EXHAUSTED (tables
 // beyond what GL holds), CANCELLED (looked at about three times a second), INTERNAL (GL). The context must
-// not be in use by another thread. Cost: preview_bench prints it; the first picture of a codec's size on a
-// context also compiles its shaders.
+// not be in use by another thread. For a single picture: GlPreview draws further ones faster.
 [[nodiscard]] absl::StatusOr<Image> RenderGl(OffscreenContext& context, const PreviewScene& scene,
                                              const RunContext& run_context);
 

@@ -36,21 +36,29 @@ void main() {
 }
 )";
 
+constexpr char kEmptySampleFragment[] = R"(#version 450 core
+out uvec4 surface_sample;
+void main() {
+  surface_sample = uvec4(0u);
+  gl_FragDepth = 1.0;
+}
+)";
+
 constexpr char kShadeVertex[] = R"(#version 450 core
 void main() {
   gl_Position = vec4(vec2((gl_VertexID << 1) & 2, gl_VertexID & 2) * 2.0 - 1.0, 0.0, 1.0);
 }
 )";
 
-// llvmpipe runs both sides of every `if` under a mask but leaves loops early, so what costs much stands in
-// loops whose length is 0 where there is nothing to do.
+// llvmpipe runs both sides of every `if`, under a mask, and leaves a loop at its end only, when no pixel of
+// eight goes on: a loop that is tested at its start runs once more for nothing. Hence `do`, and kNearest is a
+// constant of the source.
 constexpr char kShadeFragment[] = R"(
 uniform usampler2DArray surface_samples;
 uniform samplerBuffer face_corners;  // 8 a face: four positions, four normals
 uniform isamplerBuffer face_links;   // 2 a face: faces across the tile's sides; (tile, turns, sides, turns)
 uniform usamplerBuffer tile_index;
 uniform int tile_size;
-uniform bool nearest;
 uniform vec3 eye;
 uniform vec4 light;  // w = 0: unit direction to it, 1: its position
 uniform vec3 irradiance_by_pi;
@@ -177,15 +185,16 @@ vec3 Shade(int face, vec2 st, int members, mat4x2 samples) {
     btfels = ivec4(x0.x, x1.x, x2.x, x3.x);
     turns = ivec4(x0.y, x1.y, x2.y, x3.y);
   } else {
-    for (int i = 0; i < 4; ++i) {
+    int i = 0;
+    do {
       vec2 uv = Unturned(samples[i] - 0.5, links.y) + 0.5;
       ivec2 at = clamp(ivec2(floor(vec2(uv.x, 1.0 - uv.y) * float(tile_size) + kNearestShiftTexels)), ivec2(0),
                        ivec2(tile_size - 1));
       ivec2 x = Texel(face, links, at);
       btfels[i] = x.x;
       turns[i] = x.y;
-      weights[i] = i < members ? 1.0 / float(members) : 0.0;
-    }
+      weights[i] = 1.0 / float(members);
+    } while (++i < members);
   }
 
   // The sum is linear before its clamp, so blending as coefficients and after decoding are the same.
@@ -206,7 +215,7 @@ void main() {
   }
   vec3 sum = vec3(0.0);
   ivec4 pending = ivec4(notEqual(faces, uvec4(0u)));
-  while (pending.x + pending.y + pending.z + pending.w > 0) {
+  do {
     uint face = pending.x > 0 ? faces.x : pending.y > 0 ? faces.y : pending.z > 0 ? faces.z : faces.w;
     mat4x2 samples = mat4x2(0.0);
     vec2 mean = vec2(0.0);
@@ -226,17 +235,15 @@ void main() {
       squared = max(squared, i < count ? dot(offset, offset) : 0.0);
     }
     bool bilinear = squared <= kBilinearRadiusTexels * kBilinearRadiusTexels;
-    // The back of a face shows nothing.
-    int fronts = (face & 0x80000000u) == 0u ? 1 : 0;
     int members = bilinear ? 0 : count;
-    if (nearest) {
+    if (kNearest) {
       samples[0] = mean;
       members = 1;
     }
-    for (int i = 0; i < fronts; ++i) {
-      sum += float(count) * Shade(int(face) - 1, mean, members, samples);
-    }
-  }
+    vec3 radiance = Shade(max(int(face & 0x7fffffffu) - 1, 0), mean, members, samples);
+    // The back of a face shows nothing.
+    sum += (face & 0x80000000u) == 0u ? float(count) * radiance : vec3(0.0);
+  } while (pending.x + pending.y + pending.z + pending.w > 0);
   pixel = covered > 0 ? vec4(sum / float(covered), 0.25 * float(covered)) : vec4(0.0);
 }
 )";
@@ -249,16 +256,20 @@ std::string SurfaceVertexShader() {
 std::string SurfaceFragmentShader() {
   return kSurfaceFragment;
 }
+std::string EmptySampleFragmentShader() {
+  return kEmptySampleFragment;
+}
 std::string ShadeVertexShader() {
   return kShadeVertex;
 }
 
-std::string ShadeFragmentShader(const std::string& codec_source) {
+std::string ShadeFragmentShader(const std::string& codec_source, Filter filter) {
   static_assert(kSamplesPerPixel == 4, "the shader unpacks four samples");
   return absl::StrCat("#version 450 core\n",
                       absl::StrFormat("const float kLeastViewCosine = %.9e;\n", kLeastViewCosine),
                       absl::StrFormat("const float kNearestShiftTexels = %.9e;\n", kNearestShiftTexels),
                       absl::StrFormat("const float kBilinearRadiusTexels = %.9e;\n", kBilinearRadiusTexels),
+                      "const bool kNearest = ", filter == Filter::kNearest ? "true" : "false", ";\n",
                       codec_source, kShadeFragment);
 }
 

@@ -242,6 +242,32 @@ TEST_F(PreviewTest, TheSameSceneGivesTheSameBytes) {
   EXPECT_EQ(first->pixels, again->pixels);
 }
 
+TEST_F(PreviewTest, APreparedPreviewDrawsWhatItsScenesAskFor) {
+  const Dressing dressing = RandomDressing(SkewedGrid(3, 0.2, 1), 2);
+  const TileSet tile_set = RandomTileSet(RandomBtfels(9, 9, 4, 5), 16, 3);
+  const TileSet other = RandomTileSet(RandomBtfels(9, 4, 4, 6), 16, 3);
+  const auto preview = GlPreview::Create(*context_, dressing, tile_set);
+  const auto beside = GlPreview::Create(*context_, dressing, other);
+  ASSERT_TRUE(preview.ok() && beside.ok());
+  PreviewScene scene{.dressing = &dressing, .tile_set = &tile_set, .width = 100, .height = 80};
+  for (int round = 0; round < 2; ++round) {
+    for (const Filter filter : {Filter::kBilinear, Filter::kNearest}) {
+      scene.filter = filter;
+      scene.width += 7;
+      scene.camera.eye.x() += 0.1;
+      const auto image = (*preview)->Render(scene, run_);
+      const auto expected = RenderGl(*context_, scene, run_);
+      ASSERT_TRUE(image.ok() && expected.ok());
+      EXPECT_EQ(image->pixels, expected->pixels);
+      EXPECT_GT(*std::max_element(image->pixels.begin(), image->pixels.end()), 0.2f);
+    }
+  }
+  EXPECT_EQ((*beside)->Render(scene, run_).status().code(), absl::StatusCode::kInvalidArgument);
+  scene.tile_set = &other;
+  EXPECT_EQ((*preview)->Render(scene, run_).status().code(), absl::StatusCode::kInvalidArgument);
+  EXPECT_TRUE((*beside)->Render(scene, run_).ok());
+}
+
 TEST_F(PreviewTest, AContextMayServeSeveralThreadsInTurnAndTwoContextsTwoThreadsAtOnce) {
   const Dressing dressing = RandomDressing(SkewedGrid(3, 0.2, 1), 2);
   const TileSet tile_set = RandomTileSet(RandomBtfels(9, 9, 4, 5), 16, 3);
