@@ -82,12 +82,15 @@ vec4 High(uvec4 u) { return vec4(ivec4(u) >> 16); }
 // The factors of group `group`: even ones in `even`, odd ones in `odd`.
 std::string Interpolate(const std::string& group, const std::string& suffix) {
   std::string out = absl::Substitute("    vec4 even$0 = vec4(0.0), odd$0 = vec4(0.0);\n", suffix);
-  for (int i = 0; i < 3; ++i) {
-    for (int j = 0; j < 3; ++j) {
-      absl::StrAppend(&out, absl::Substitute("    u = texelFetch(codec_words, words$0[$1] + $2); even$3 += "
-                                             "pair$0[$1] * Low(u); odd$3 += pair$0[$1] * High(u);\n",
-                                             i, j, group, suffix));
-    }
+  for (int i = 0; i < 9; ++i) {
+    absl::StrAppend(&out, absl::Substitute("    factors[$0] = texelFetch(codec_words, words$1[$2] + $3);\n",
+                                           i, i / 3, i % 3, group));
+  }
+  for (int i = 0; i < 9; ++i) {
+    absl::StrAppend(&out,
+                    absl::Substitute("    even$0 += pair$1[$2] * Low(factors[$3]); odd$0 += pair$1[$2] * "
+                                     "High(factors[$3]);\n",
+                                     suffix, i / 3, i % 3, i));
   }
   absl::StrAppend(&out,
                   absl::Substitute("    q = texelFetch(codec_values, 4 + $0);\n    even$1 = even$1 * q.x "
@@ -130,7 +133,7 @@ vec3 BlendUnturned(ivec4 btfels, vec4 weights, int count, vec3 light, vec3 view)
   for (int i = 0; i < 3; ++i) {
     absl::StrAppend(&out, absl::Substitute("  ivec3 words$0 = pairs$0 * $1;\n", i, layout.num_groups()));
   }
-  absl::StrAppend(&out, "  uvec4 u;\n  vec4 q;\n  int n, g = 0;\n  do {\n", Interpolate("g", ""),
+  absl::StrAppend(&out, "  uvec4 u, factors[9];\n  vec4 q;\n  int n, g = 0;\n  do {\n", Interpolate("g", ""),
                   BlendCodes("g", layout.btfel_texels()),
                   "    sum.x += dot(even, even_codes) + dot(odd, odd_codes);\n  } while (++g < ",
                   layout.luma_groups, ");\n");

@@ -248,12 +248,14 @@ vec3 BlendBtfels(ivec4 btfels, ivec4 turns, vec4 weights, int count, vec3 light,
   AppendScales("yv", layout.kv, layout.view_scale_begin(), &out);
   absl::StrAppend(&out, "    int at = btfels[n] * ", layout.kv * layout.btfel_row_texels(),
                   ", j = 0, rows = is_lit ? ", layout.kv, " : 1;\n    vec3 value = vec3(0.0);\n    do {\n",
-                  "      vec3 low = vec3(0.0), high = vec3(0.0);\n      uvec4 u;\n");
+                  "      vec3 low = vec3(0.0), high = vec3(0.0);\n      uvec4 u[", layout.btfel_row_texels(),
+                  "];\n");
+  for (int texel = 0; texel < layout.btfel_row_texels(); ++texel) {
+    absl::StrAppend(&out, "      u[", texel, "] = texelFetch(btfel_words, at + ", texel, ");\n");
+  }
   for (int n = 0; n < layout.row_codes(); ++n) {
-    if (n % kCodesPerTexel == 0) {
-      absl::StrAppend(&out, "      u = texelFetch(btfel_words, at + ", n / kCodesPerTexel, ");\n");
-    }
-    const std::string word = absl::StrCat("u.", std::string(1, kComponent[n % kCodesPerTexel / 2]));
+    const std::string word =
+        absl::StrCat("u[", n / kCodesPerTexel, "].", std::string(1, kComponent[n % kCodesPerTexel / 2]));
     const std::string channel(1, kComponent[n / layout.kl]);
     absl::StrAppend(&out,
                     n % 2 == 0 ? absl::StrCat("      low.", channel, " += float(int(", word, " << 16))")

@@ -19,9 +19,9 @@ BtfelTable Encoded(BtfSource& btf, int rank) {
   return FindCodec("dfmf")->Encode(btf, {.rank = rank}, {})->btfels;
 }
 
-// Each factor is off by half a step of its 16 bits, whose range is that of the largest of eight, and is
-// multiplied by codes of up to 255: 255 * 2^-16 / 255 of about 1 for the first component, less for the rest.
-constexpr double kTolerance = 6e-5;
+// Factors and coefficients are off by up to 2^-16 of the largest contribution of their group, 1.5e-5 of about
+// 1 for the first; each of them has its own sign.
+constexpr double kTolerance = 2e-5;
 
 TEST(DfmfGlslTest, BlendsWhatTheDecoderBlends) {
   SampledBtf btf = Shiny();
