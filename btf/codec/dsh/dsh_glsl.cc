@@ -5,7 +5,6 @@
 #include <bit>
 #include <cmath>
 #include <cstdint>
-#include <limits>
 #include <span>
 #include <string>
 #include <vector>
@@ -274,32 +273,29 @@ vec3 BlendBtfels(ivec4 btfels, ivec4 turns, vec4 weights, int count, vec3 light,
   return out;
 }
 
-// Factors a_i and b_j, the products of which are at least `least`[i * kv + j] > 0 and not much above: the
-// logarithms are a mean over j, then what remains, each as low as the other allows.
+// Factors a_i and b_j, the products of which are at least `least`[i * kv + j] > 0 and not much above: a_i
+// starts as the root of a sum of squares, then each is made as low as the other allows.
 void CoverByProducts(const std::vector<double>& least, int kl, int kv, std::span<float> a,
                      std::span<float> b) {
-  std::vector<double> log_a(kl, 0.0);
-  std::vector<double> log_b(kv, -std::numeric_limits<double>::infinity());
+  std::vector<double> over_j(kl, 0.0);
+  std::vector<double> over_i(kv, 0.0);
   for (int i = 0; i < kl; ++i) {
     for (int j = 0; j < kv; ++j) {
-      log_a[i] += std::log(least[i * kv + j]) / kv;
+      over_j[i] += least[i * kv + j] * least[i * kv + j];
+    }
+    over_j[i] = std::sqrt(over_j[i]);
+    for (int j = 0; j < kv; ++j) {
+      over_i[j] = std::max(over_i[j], least[i * kv + j] / over_j[i]);
     }
   }
   for (int i = 0; i < kl; ++i) {
+    double lowest = 0.0;
     for (int j = 0; j < kv; ++j) {
-      log_b[j] = std::max(log_b[j], std::log(least[i * kv + j]) - log_a[i]);
+      lowest = std::max(lowest, least[i * kv + j] / over_i[j]);
     }
+    a[i] = static_cast<float>(lowest);
   }
-  for (int i = 0; i < kl; ++i) {
-    double lowest = -std::numeric_limits<double>::infinity();
-    for (int j = 0; j < kv; ++j) {
-      lowest = std::max(lowest, std::log(least[i * kv + j]) - log_b[j]);
-    }
-    a[i] = static_cast<float>(std::exp(lowest));
-  }
-  for (int j = 0; j < kv; ++j) {
-    b[j] = static_cast<float>(std::exp(log_b[j]));
-  }
+  std::ranges::transform(over_i, b.begin(), [](double factor) { return static_cast<float>(factor); });
 }
 
 void CopyBasis(const CodecTable& basis, int size, BasisForm form, int first_texel,

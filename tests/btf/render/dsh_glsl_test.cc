@@ -1,7 +1,11 @@
 #include "btf/codec/dsh/dsh_glsl.h"
 
+#include <string>
+#include <string_view>
+
 #include <gtest/gtest.h>
 
+#include "tests/btf/codec/synthetic_btf.h"
 #include "tests/btf/render/blend_queries.h"
 #include "tests/btf/render/hand_made.h"
 
@@ -43,6 +47,19 @@ INSTANTIATE_TEST_SUITE_P(Sizes, DshGlslTest,
                                    : info.param.basis == BasisKind::kGeneral ? "General"
                                                                              : "Orthonormal");
                          });
+
+// The magnitudes of real coefficients are no product of one of the light and one of the view function.
+TEST(DshGlsl, BlendsEncodingsAsTheDecoderDoes) {
+  SampledBtf btf = ShinyBtf(8, 6, RingDirections(6, 16), RingDirections(6, 16));
+  for (const std::string_view codec : {"dsh", "dsh-cls"}) {
+    const auto material = FindCodec(codec)->Encode(btf, {.kl = 25, .kv = 25}, {});
+    ASSERT_TRUE(material.ok()) << material.status();
+    const auto glsl = DshGlsl(material->btfels);
+    ASSERT_TRUE(glsl.ok()) << glsl.status();
+    SCOPED_TRACE(std::string(codec));
+    ExpectBlendsWhatTheDecoderBlends(material->btfels, *glsl, 2e-5);
+  }
+}
 
 TEST(DshGlsl, RefusesTablesThatDoNotFit) {
   BtfelTable table = RandomBtfels(3, 4, 4, 1);
