@@ -9,9 +9,14 @@
 namespace tessera {
 namespace {
 
-absl::Status CheckDirections(const std::vector<Direction>& directions, const char* name) {
+absl::Status CheckDirections(const std::vector<Direction>& directions, const char* name,
+                             size_t max_directions) {
   if (directions.empty()) {
     return absl::InvalidArgumentError(absl::StrCat("the BTF has no ", name));
+  }
+  if (directions.size() > max_directions) {
+    return absl::InvalidArgumentError(
+        absl::StrCat("the BTF has ", directions.size(), " ", name, ", at most ", max_directions));
   }
   for (size_t i = 0; i < directions.size(); ++i) {
     constexpr double kRounding = 1e-9;
@@ -27,13 +32,13 @@ absl::Status CheckDirections(const std::vector<Direction>& directions, const cha
 
 }  // namespace
 
-absl::Status CheckEncoderInput(const BtfInfo& info) {
+absl::Status CheckEncoderInput(const BtfInfo& info, size_t max_directions) {
   if (info.width < 1 || info.height < 1) {
     return absl::InvalidArgumentError(
         absl::StrCat("the BTF is ", info.width, "x", info.height, " texels, expected at least 1x1"));
   }
-  TESSERA_RETURN_IF_ERROR(CheckDirections(info.views, "views"));
-  return CheckDirections(info.lights, "lights");
+  TESSERA_RETURN_IF_ERROR(CheckDirections(info.views, "views", max_directions));
+  return CheckDirections(info.lights, "lights", max_directions);
 }
 
 absl::Status IllegalSampleError(const BtfInfo& info, int row_begin, std::span<const float> samples) {

@@ -2,6 +2,8 @@
 #pragma once
 
 #include <cmath>
+#include <cstddef>
+#include <limits>
 #include <span>
 
 #include <absl/status/status.h>
@@ -17,9 +19,10 @@ inline constexpr float kLargestSample = 1e12F;
   return std::abs(f) <= kLargestSample;
 }
 
-// Errors: INVALID_ARGUMENT naming an empty extent or direction set, or a direction that is not finite or
-// below the horizon.
-[[nodiscard]] absl::Status CheckEncoderInput(const BtfInfo& info);
+// Errors: INVALID_ARGUMENT naming an empty extent, a direction set that is empty or larger than
+// `max_directions`, or a direction that is not finite or below the horizon.
+[[nodiscard]] absl::Status CheckEncoderInput(const BtfInfo& info,
+                                             size_t max_directions = std::numeric_limits<size_t>::max());
 
 // Names view, light, texel and channel of the first illegal one of `samples`, which start at row `row_begin`
 // in ReadRows' layout. INVALID_ARGUMENT; INTERNAL if all are legal.

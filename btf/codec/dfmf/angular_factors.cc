@@ -27,6 +27,14 @@ AngularCodes QuantizeFactors(const Eigen::MatrixXd& factors, DType dtype) {
   return result;
 }
 
+std::vector<AngularCodes> QuantizeParts(const Eigen::MatrixXd& factors, Eigen::Index part_rows, DType dtype) {
+  std::vector<AngularCodes> parts;
+  for (Eigen::Index begin = 0; begin < factors.rows(); begin += part_rows) {
+    parts.push_back(QuantizeFactors(factors.middleRows(begin, part_rows), dtype));
+  }
+  return parts;
+}
+
 Eigen::MatrixXd DequantizeFactors(const AngularCodes& codes) {
   const Eigen::Index rank = codes.codes.shape[1];
   Eigen::MatrixXd factors(codes.codes.shape[0], rank);
@@ -53,33 +61,6 @@ Eigen::VectorXd FactorErrors(const Eigen::MatrixXd& factors, const Eigen::Matrix
     }
   }
   return errors;
-}
-
-Ranks ChooseRanks(const std::vector<ComponentCost>& luma, const std::vector<ComponentCost>& chroma,
-                  double energy, uint64_t fixed_bytes, const RankBudget& budget) {
-  assert(!luma.empty());
-  Ranks ranks{.luma = 1, .squared_error = energy - luma[0].gain, .bytes = fixed_bytes + luma[0].bytes};
-  const auto next = [](const std::vector<ComponentCost>& list, int taken) {
-    const bool has_more = static_cast<size_t>(taken) < list.size();
-    return has_more && list[taken].gain > 0.0 ? list[taken] : ComponentCost{};
-  };
-  while (ranks.luma + ranks.chroma < budget.max_rank && ranks.squared_error > budget.squared_error) {
-    const ComponentCost a = next(luma, ranks.luma);
-    const ComponentCost b = next(chroma, ranks.chroma);
-    const auto fits = [&](const ComponentCost& c) {
-      return c.gain > 0.0 && ranks.bytes + c.bytes <= budget.max_bytes;
-    };
-    const bool take_luma = fits(a) && (!fits(b) || a.gain * static_cast<double>(b.bytes) >=
-                                                       b.gain * static_cast<double>(a.bytes));
-    if (!take_luma && !fits(b)) {
-      break;
-    }
-    const ComponentCost& taken = take_luma ? a : b;
-    ++(take_luma ? ranks.luma : ranks.chroma);
-    ranks.squared_error -= taken.gain;
-    ranks.bytes += taken.bytes;
-  }
-  return ranks;
 }
 
 }  // namespace tessera

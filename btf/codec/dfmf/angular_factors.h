@@ -24,6 +24,9 @@ struct AngularCodes {
 
 // `factors` is [rows][rank], finite, rank >= 1; dtype u8 or u16. Errors are at most half a step.
 [[nodiscard]] AngularCodes QuantizeFactors(const Eigen::MatrixXd& factors, DType dtype);
+// The same for each part of `part_rows` rows by itself.
+[[nodiscard]] std::vector<AngularCodes> QuantizeParts(const Eigen::MatrixXd& factors, Eigen::Index part_rows,
+                                                      DType dtype);
 // The inverse, [rows][rank].
 [[nodiscard]] Eigen::MatrixXd DequantizeFactors(const AngularCodes& codes);
 
@@ -33,32 +36,5 @@ struct AngularCodes {
 [[nodiscard]] Eigen::VectorXd FactorErrors(const Eigen::MatrixXd& factors, const Eigen::MatrixXd& stored,
                                            const Eigen::MatrixXd& light_smoothing,
                                            const Eigen::MatrixXd& view_smoothing);
-
-// One candidate component.
-struct ComponentCost {
-  double gain = 0.0;   // squared error that it removes, over all samples; may be negative
-  uint64_t bytes = 0;  // that it adds to the container
-};
-
-// How far to go in two lists whose components come in order.
-struct RankBudget {
-  int max_rank = 0;            // of both together
-  double squared_error = 0.0;  // stop once no more is left
-  uint64_t max_bytes = 0;
-};
-
-struct Ranks {
-  int luma = 0;
-  int chroma = 0;
-  double squared_error = 0.0;  // what is left
-  uint64_t bytes = 0;
-};
-
-// Takes components in turn from the list whose next one gains more a byte, until the budget ends or nothing
-// gains; the first of luma always. `energy` is the squared norm of all samples, `fixed_bytes` what the
-// container takes without components.
-[[nodiscard]] Ranks ChooseRanks(const std::vector<ComponentCost>& luma,
-                                const std::vector<ComponentCost>& chroma, double energy, uint64_t fixed_bytes,
-                                const RankBudget& budget);
 
 }  // namespace tessera

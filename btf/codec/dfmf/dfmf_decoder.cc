@@ -11,6 +11,7 @@
 #include <absl/strings/str_join.h>
 
 #include "btf/base/status_macros.h"
+#include "btf/math/max_theta.h"
 
 namespace tessera {
 namespace {
@@ -73,7 +74,6 @@ absl::StatusOr<DfmfDecoder::Side> DfmfDecoder::MakeSide(const std::vector<Direct
     return absl::InvalidArgumentError(
         absl::StrCat(name, "s: ", directions.size(), " directions, expected 1 to ", kMaxDfmfDirections));
   }
-  double max_theta_rad = 0.0;
   for (size_t i = 0; i < directions.size(); ++i) {
     // Directions that were stored as float32 may lie a rounding below the horizon.
     constexpr double kTolerance = 1e-4;
@@ -83,8 +83,8 @@ absl::StatusOr<DfmfDecoder::Side> DfmfDecoder::MakeSide(const std::vector<Direct
                                                      DegFromRad(directions[i].theta_rad),
                                                      " degrees, expected 0 to 90"));
     }
-    max_theta_rad = std::max(max_theta_rad, std::min(directions[i].theta_rad, kPi / 2.0));
   }
+  const double max_theta_rad = MaxThetaRad(directions);
   TESSERA_ASSIGN_OR_RETURN(const int nodes,
                            FindInteger(parameters, name + "_nodes", 3, kMaxGridNodesPerSide));
   if (nodes % 2 == 0) {

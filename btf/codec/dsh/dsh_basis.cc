@@ -11,14 +11,6 @@
 
 namespace tessera {
 
-double MaxThetaRad(const std::vector<Direction>& directions) {
-  double largest = 0.0;
-  for (const Direction& direction : directions) {
-    largest = std::max(largest, std::min(direction.theta_rad, kPi / 2.0));
-  }
-  return largest;
-}
-
 Eigen::MatrixXd OrthonormalDshBasis(int n, DshArgument argument, double max_theta_rad) {
   const int degree = ShDegree(n);
   const double cosine = std::cos(max_theta_rad);

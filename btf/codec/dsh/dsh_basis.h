@@ -10,8 +10,6 @@
 // G couples functions of one order m only, and those of m and -m alike, so y' turn by quarters as y do.
 #pragma once
 
-#include <vector>
-
 #include <Eigen/Core>
 
 #include "btf/math/conventions.h"
@@ -28,8 +26,5 @@ inline constexpr double kDshGramFloor = 1e-10;
 // max_theta_rad in [0, pi/2]. Entries between functions of different order are exactly 0, those of m and -m
 // exactly equal.
 [[nodiscard]] Eigen::MatrixXd OrthonormalDshBasis(int n, DshArgument argument, double max_theta_rad);
-
-// Largest polar angle of the directions, within [0, pi/2].
-[[nodiscard]] double MaxThetaRad(const std::vector<Direction>& directions);
 
 }  // namespace tessera

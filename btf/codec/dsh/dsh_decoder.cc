@@ -10,6 +10,7 @@
 #include <absl/strings/str_join.h>
 
 #include "btf/base/status_macros.h"
+#include "btf/math/max_theta.h"
 #include "btf/math/spherical_harmonics.h"
 
 namespace tessera {
@@ -85,9 +86,7 @@ DshDecoder::DshDecoder(const BtfelTable& table, Eigen::MatrixXd basis_light, Eig
 
 DshDecoder::PolarLimit DshDecoder::LimitOf(const std::vector<Direction>& directions) {
   PolarLimit limit;
-  for (const Direction& direction : directions) {
-    limit.theta_rad = std::max(limit.theta_rad, std::min(direction.theta_rad, kPi / 2.0));
-  }
+  limit.theta_rad = MaxThetaRad(directions);
   limit.cos_theta = std::cos(limit.theta_rad);
   limit.sin_theta = std::sin(limit.theta_rad);
   return limit;

@@ -19,7 +19,9 @@
 #include "btf/codec/dsh/coefficient_store.h"
 #include "btf/codec/dsh/dsh_basis.h"
 #include "btf/codec/dsh/dsh_fitter.h"
+#include "btf/codec/encoder_input.h"
 #include "btf/codec/quantize.h"
+#include "btf/math/max_theta.h"
 #include "btf/math/ridge.h"
 #include "btf/math/spherical_harmonics.h"
 
@@ -52,22 +54,6 @@ class ScratchPool {
   std::vector<std::unique_ptr<DshScratch>> free_;  // guarded by mutex_
 };
 
-absl::Status CheckDirections(const std::vector<Direction>& directions, const char* name) {
-  if (directions.empty()) {
-    return absl::InvalidArgumentError(absl::StrCat("the BTF has no ", name));
-  }
-  for (size_t i = 0; i < directions.size(); ++i) {
-    constexpr double kRounding = 1e-9;
-    const Direction& d = directions[i];
-    if (!std::isfinite(d.phi_rad) || !(d.theta_rad >= 0.0 && d.theta_rad <= kPi / 2.0 + kRounding)) {
-      return absl::InvalidArgumentError(absl::StrCat(name, "[", i, "]: polar angle ", DegFromRad(d.theta_rad),
-                                                     " degrees, azimuth ", DegFromRad(d.phi_rad),
-                                                     ", expected a polar angle from 0 to 90"));
-    }
-  }
-  return absl::OkStatus();
-}
-
 absl::Status CheckInput(const BtfInfo& info, const EncodeParams& params) {
   for (const auto& [name, value] : {std::pair("kl", params.kl), std::pair("kv", params.kv)}) {
     if (!IsShFunctionCount(value)) {
@@ -75,33 +61,7 @@ absl::Status CheckInput(const BtfInfo& info, const EncodeParams& params) {
           absl::StrCat(name, " = ", value, ": legal values are 1, 4, 9, 16, 25, 36 and 49"));
     }
   }
-  if (info.width < 1 || info.height < 1) {
-    return absl::InvalidArgumentError(
-        absl::StrCat("the BTF is ", info.width, "x", info.height, " texels, expected at least 1x1"));
-  }
-  TESSERA_RETURN_IF_ERROR(CheckDirections(info.views, "views"));
-  return CheckDirections(info.lights, "lights");
-}
-
-// Names the first illegal sample of a block of rows.
-absl::Status IllegalSampleError(const BtfInfo& info, int row_begin, std::span<const float> samples) {
-  const auto it = std::ranges::find_if_not(samples, IsLegalSample);
-  if (it == samples.end()) {
-    return absl::InternalError("samples were refused, but none is illegal");
-  }
-  size_t index = static_cast<size_t>(it - samples.begin());
-  const auto take = [&index](size_t extent) {
-    const size_t value = index % extent;
-    index /= extent;
-    return value;
-  };
-  const size_t light = take(info.lights.size());
-  const size_t view = take(info.views.size());
-  const size_t channel = take(3);
-  const size_t x = take(static_cast<size_t>(info.width));
-  return absl::InvalidArgumentError(absl::StrCat(
-      "view ", view, ", light ", light, ", texel (", x, ", ", static_cast<size_t>(row_begin) + index,
-      "), channel ", channel, ": sample ", *it, ", expected a finite value up to ", kMaxSample));
+  return CheckEncoderInput(info);
 }
 
 struct Ranges {

@@ -33,7 +33,8 @@ inline constexpr double kDshMaxRidge = 0.01;
 // params.memory_budget_bytes; float coefficients that exceed it go to an unnamed temporary file. The result
 // does not depend on the budget nor on the number of threads. "dsh" reads up to 8 rows twice. Errors:
 // INVALID_ARGUMENT naming kl, kv, a direction or the view, light and texel of a sample that is not finite or
-// beyond kMaxSample; RESOURCE_EXHAUSTED (temporary folder); CANCELLED; whatever the source returns.
+// beyond kLargestSample (encoder_input.h); RESOURCE_EXHAUSTED (temporary folder); CANCELLED; whatever the
+// source returns.
 [[nodiscard]] absl::StatusOr<Material> EncodeDshCls(BtfSource& source, const EncodeParams& params,
                                                     const RunContext& context);
 [[nodiscard]] absl::StatusOr<Material> EncodeDshLs(BtfSource& source, const EncodeParams& params,

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "btf/codec/encoder_input.h"
 #include "btf/math/constrained_least_squares.h"
 #include "btf/math/spherical_harmonics.h"
 
@@ -42,7 +43,7 @@ float SumOfSquares(const float* f, Eigen::Index count) {
 
 // `sum_of_squares` is theirs: one look at it clears almost every signal; NaN fails every comparison.
 bool AreLegalSamples(const float* f, Eigen::Index count, float sum_of_squares) {
-  return sum_of_squares <= kMaxSample * kMaxSample || std::all_of(f, f + count, IsLegalSample);
+  return sum_of_squares <= kLargestSample * kLargestSample || std::all_of(f, f + count, IsLegalSample);
 }
 
 double SolidAngle(ClsEnergy energy) {
@@ -161,10 +162,6 @@ class LinearFitter final : public DshFitter {
 };
 
 }  // namespace
-
-bool IsLegalSample(float f) {
-  return std::abs(f) <= kMaxSample;
-}
 
 int64_t DshFitter::TexelsPerGroup() const {
   return std::max<int64_t>(1, kSignalsPerGroup / (3 * std::max<int64_t>(num_views_, kl_)));

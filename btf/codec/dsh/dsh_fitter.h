@@ -17,10 +17,6 @@
 
 namespace tessera {
 
-// Samples beyond this are refused: their squares must add up in float.
-inline constexpr float kMaxSample = 1e12F;
-[[nodiscard]] bool IsLegalSample(float f);
-
 // Intermediate results of one group of texels, reused from group to group.
 struct DshScratch {
   Eigen::MatrixXf projected;  // constrained: [signals, padded][kl], then [kv]
@@ -41,8 +37,8 @@ class DshFitter {
   [[nodiscard]] size_t CoefficientsPerTexel() const { return static_cast<size_t>(3 * kl_ * kv_); }
 
   // samples [texel][channel][view][light] -> coefficients [texel][(channel * kv + j) * kl + i]. False when a
-  // sample is not finite or beyond kMaxSample; the coefficients are then undefined. Results of a texel depend
-  // on nothing but its samples and the number of texels in its group.
+  // sample is not legal (encoder_input.h); the coefficients are then undefined. Results of a texel depend on
+  // nothing but its samples and the number of texels in its group.
   [[nodiscard]] virtual bool Fit(const float* samples, int num_texels, float* coefficients,
                                  DshScratch& scratch) const = 0;
 

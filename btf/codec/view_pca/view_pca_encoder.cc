@@ -18,14 +18,12 @@
 #include "btf/codec/dsh/coefficient_store.h"
 #include "btf/codec/encoder_input.h"
 #include "btf/codec/quantize.h"
+#include "btf/codec/row_passes.h"
 #include "btf/codec/view_pca/view_pca_decoder.h"
 #include "btf/math/hemisphere_triangulation.h"
 
 namespace tessera {
 namespace {
-
-// More rows at once gain nothing.
-constexpr uint64_t kMaxRowBlockBytes = uint64_t{64} << 20;
 
 struct Sizes {
   Eigen::Index num_views = 0;
@@ -62,75 +60,34 @@ struct RowOfView {
   }
 };
 
-// What reads the source block by block, and tells how far two passes have come.
-class RowReader {
- public:
-  RowReader(BtfSource& source, uint64_t budget_bytes, const RunContext& context)
-      : source_(source), context_(context), source_context_(context) {
-    // One stage for the caller: the source's own rows are not told apart from their encoding.
-    source_context_.progress = nullptr;
-    const uint64_t row_bytes = source.SamplesPerRow() * sizeof(float);
-    rows_per_block_ =
-        static_cast<int>(std::clamp<uint64_t>(std::min(budget_bytes, kMaxRowBlockBytes) / row_bytes, 1,
-                                              static_cast<uint64_t>(source.info().height)));
-    // Not zeroed, the source fills it.
-    buffer_ = std::make_unique_for_overwrite<float[]>(source.SamplesPerRow() * rows_per_block_);
-  }
-
-  [[nodiscard]] int rows_per_block() const { return rows_per_block_; }
-
-  // Calls body(row, num_rows, samples) for all blocks; `pass` of 0 and 1.
-  template <typename Body>
-  absl::Status ForEachBlock(int pass, const Body& body) {
-    const int height = source_.info().height;
-    for (int row = 0; row < height; row += rows_per_block_) {
-      context_.Report("encode", static_cast<uint64_t>(pass) * height + row, 2ULL * height, "rows");
-      TESSERA_RETURN_IF_ERROR(context_.CheckStop());
-      const int num_rows = std::min(rows_per_block_, height - row);
-      const std::span<float> samples(buffer_.get(), source_.SamplesPerRow() * num_rows);
-      TESSERA_RETURN_IF_ERROR(source_.ReadRows(row, num_rows, samples, source_context_));
-      TESSERA_RETURN_IF_ERROR(body(row, num_rows, std::span<const float>(samples)));
-    }
-    return absl::OkStatus();
-  }
-
- private:
-  BtfSource& source_;
-  const RunContext& context_;
-  RunContext source_context_;
-  int rows_per_block_ = 1;
-  std::unique_ptr<float[]> buffer_;
-};
-
 // Sums over texels and channels of x x^T, x centred over the lights: [view] of [lights][lights], lower
 // triangle. Each view is summed by one task, row after row in float, rows in double.
-absl::StatusOr<std::vector<Eigen::MatrixXd>> Covariances(const BtfInfo& info, RowReader& reader,
+absl::StatusOr<std::vector<Eigen::MatrixXd>> Covariances(const BtfInfo& info, RowPasses& passes,
                                                          const RunContext& context) {
   const Sizes sizes(info);
   std::vector<Eigen::MatrixXd> sums(sizes.num_views,
                                     Eigen::MatrixXd::Zero(sizes.num_lights, sizes.num_lights));
   const size_t row_samples = static_cast<size_t>(sizes.signals_per_row * sizes.num_views * sizes.num_lights);
-  TESSERA_RETURN_IF_ERROR(
-      reader.ForEachBlock(0, [&](int row_begin, int num_rows, std::span<const float> samples) {
-        std::atomic<bool> is_legal = true;
-        ParallelFor(context, 0, sizes.num_views, 1, [&](int64_t begin, int64_t end) {
-          RowOfView row;
-          Eigen::MatrixXf products(sizes.num_lights, sizes.num_lights);
-          for (int64_t view = begin; view < end; ++view) {
-            for (int r = 0; r < num_rows; ++r) {
-              if (!row.Gather(sizes, samples.data() + r * row_samples, view)) {
-                is_legal = false;
-                return;
-              }
-              products.setZero();
-              products.selfadjointView<Eigen::Lower>().rankUpdate(row.samples);
-              sums[view] += products.cast<double>();
-            }
+  TESSERA_RETURN_IF_ERROR(passes.Run([&](const SampleBlock& block) {
+    std::atomic<bool> is_legal = true;
+    ParallelFor(context, 0, sizes.num_views, 1, [&](int64_t begin, int64_t end) {
+      RowOfView row;
+      Eigen::MatrixXf products(sizes.num_lights, sizes.num_lights);
+      for (int64_t view = begin; view < end; ++view) {
+        for (int r = 0; r < block.num_rows; ++r) {
+          if (!row.Gather(sizes, block.samples.data() + r * row_samples, view)) {
+            is_legal = false;
+            return;
           }
-        });
-        TESSERA_RETURN_IF_ERROR(context.CheckStop());
-        return is_legal ? absl::OkStatus() : IllegalSampleError(info, row_begin, samples);
-      }));
+          products.setZero();
+          products.selfadjointView<Eigen::Lower>().rankUpdate(row.samples);
+          sums[view] += products.cast<double>();
+        }
+      }
+    });
+    TESSERA_RETURN_IF_ERROR(context.CheckStop());
+    return is_legal ? absl::OkStatus() : IllegalSampleError(info, block.row, block.samples);
+  }));
   return sums;
 }
 
@@ -226,14 +183,7 @@ absl::Status CheckInput(const BtfInfo& info, const EncodeParams& params) {
     return absl::InvalidArgumentError(absl::StrCat("eigen_textures = ", params.eigen_textures,
                                                    ": legal values are 1 to ", kMaxEigenTextures));
   }
-  TESSERA_RETURN_IF_ERROR(CheckEncoderInput(info));
-  for (const auto& [name, count] : {std::pair("views", info.views.size()), {"lights", info.lights.size()}}) {
-    if (count > kMaxViewPcaDirections) {
-      return absl::InvalidArgumentError(
-          absl::StrCat("the BTF has ", count, " ", name, ", at most ", kMaxViewPcaDirections));
-    }
-  }
-  return absl::OkStatus();
+  return CheckEncoderInput(info, kMaxViewPcaDirections);
 }
 
 }  // namespace
@@ -256,11 +206,11 @@ absl::StatusOr<Material> EncodeViewPca(BtfSource& source, const EncodeParams& pa
                                                      sizes.num_views, " views take ", covariance_bytes,
                                                      " bytes, a quarter of the memory budget is ", quarter));
   }
-  RowReader reader(source, quarter, context);
+  RowPasses passes(source, quarter, /*expected_passes=*/2, context);
   ViewBases bases;
   {
     TESSERA_ASSIGN_OR_RETURN(const std::vector<Eigen::MatrixXd> covariances,
-                             Covariances(info, reader, context));
+                             Covariances(info, passes, context));
     bases = LeadingEigenvectors(covariances, c, context);
     TESSERA_RETURN_IF_ERROR(context.CheckStop());
   }
@@ -270,32 +220,30 @@ absl::StatusOr<Material> EncodeViewPca(BtfSource& source, const EncodeParams& pa
       CoefficientStore::Create(values_per_row * info.height, 2 * quarter, params.spill_folder));
   Ranges ranges{std::vector<float>(k, std::numeric_limits<float>::infinity()),
                 std::vector<float>(k, -std::numeric_limits<float>::infinity())};
-  TESSERA_RETURN_IF_ERROR(reader.ForEachBlock(
-      1, [&](int row_begin, int num_rows, std::span<const float> samples) -> absl::Status {
-        const std::span<float> block =
-            store->BeginWrite(values_per_row * row_begin, values_per_row * num_rows);
-        std::atomic<bool> is_legal = true;
-        ParallelFor(context, 0, sizes.num_views, 1, [&](int64_t begin, int64_t end) {
-          RowOfView row;
-          Eigen::MatrixXf scratch;
-          for (int64_t view = begin; view < end; ++view) {
-            for (int r = 0; r < num_rows; ++r) {
-              if (!row.Gather(sizes, samples.data() + r * source.SamplesPerRow(), view)) {
-                is_legal = false;
-                return;
-              }
-              ProjectRow(row, bases.weights[view], view, k, scratch, block.data() + r * values_per_row,
-                         ranges);
-            }
+  TESSERA_RETURN_IF_ERROR(passes.Run([&](const SampleBlock& block) -> absl::Status {
+    const std::span<float> values =
+        store->BeginWrite(values_per_row * block.row, values_per_row * block.num_rows);
+    std::atomic<bool> is_legal = true;
+    ParallelFor(context, 0, sizes.num_views, 1, [&](int64_t begin, int64_t end) {
+      RowOfView row;
+      Eigen::MatrixXf scratch;
+      for (int64_t view = begin; view < end; ++view) {
+        for (int r = 0; r < block.num_rows; ++r) {
+          if (!row.Gather(sizes, block.samples.data() + r * source.SamplesPerRow(), view)) {
+            is_legal = false;
+            return;
           }
-        });
-        TESSERA_RETURN_IF_ERROR(context.CheckStop());
-        if (!is_legal) {  // a source that changed its mind
-          return IllegalSampleError(info, row_begin, samples);
+          ProjectRow(row, bases.weights[view], view, k, scratch, values.data() + r * values_per_row, ranges);
         }
-        return store->EndWrite();
-      }));
-  context.Report("encode", 2ULL * info.height, 2ULL * info.height, "rows");
+      }
+    });
+    TESSERA_RETURN_IF_ERROR(context.CheckStop());
+    if (!is_legal) {  // a source that changed its mind
+      return IllegalSampleError(info, block.row, block.samples);
+    }
+    return store->EndWrite();
+  }));
+  passes.Finish();
 
   Material material;
   material.width = info.width;
@@ -315,10 +263,10 @@ absl::StatusOr<Material> EncodeViewPca(BtfSource& source, const EncodeParams& pa
                   {"view_triangles", TriangleTable(info.views)}};
   Quantisation quantisation = UniformQuantisation(ranges.minima, ranges.maxima);
   TESSERA_ASSIGN_OR_RETURN(table.codes, CreateCodes(values_per_row * info.height, params));
-  for (int row = 0; row < info.height; row += reader.rows_per_block()) {
+  for (int row = 0; row < info.height; row += passes.rows_per_block()) {
     TESSERA_RETURN_IF_ERROR(context.CheckStop());
     const size_t begin = values_per_row * row;
-    const size_t count = values_per_row * std::min(reader.rows_per_block(), info.height - row);
+    const size_t count = values_per_row * std::min(passes.rows_per_block(), info.height - row);
     TESSERA_ASSIGN_OR_RETURN(const std::span<const float> values, store->Read(begin, count));
     constexpr int64_t kTexelsPerTask = 64;
     ParallelFor(context, 0, static_cast<int64_t>(count / k), kTexelsPerTask,

@@ -241,7 +241,7 @@ TEST(DfmfEncodeTest, RefusesWhatItCannotEncode) {
   SampledBtf below(1, 1, {{1.7, 0.0}}, {{0.0, 0.0}});
   EXPECT_THAT(Message(Encode(below, {.rank = 1}).status()), HasSubstr("views[0]"));
   SampledBtf none(1, 1, {{0.0, 0.0}}, {});
-  EXPECT_THAT(Message(Encode(none, {.rank = 1}).status()), HasSubstr("0 lights"));
+  EXPECT_THAT(Message(Encode(none, {.rank = 1}).status()), HasSubstr("no lights"));
 }
 
 TEST(DfmfEncodeTest, StopsWhenAsked) {
