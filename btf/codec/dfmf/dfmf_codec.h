@@ -2,13 +2,14 @@
 #pragma once
 
 #include "btf/codec/codec.h"
+#include "btf/codec/dfmf/dfmf_decoder.h"
 
 namespace tessera {
 
 class DfmfCodec final : public Codec {
  public:
   [[nodiscard]] std::string_view id() const override { return "dfmf"; }
-  [[nodiscard]] int version() const override { return 1; }
+  [[nodiscard]] int version() const override { return kDfmfVersion; }
   [[nodiscard]] absl::StatusOr<Material> Encode(BtfSource& source, const EncodeParams& params,
                                                 const RunContext& context) const override;
   [[nodiscard]] absl::StatusOr<Embedding> Embed(const Material& material, int dims,

@@ -95,7 +95,10 @@ absl::StatusOr<DfmfDecoder::Side> DfmfDecoder::MakeSide(const std::vector<Direct
   TESSERA_ASSIGN_OR_RETURN(rule.trend, FindInteger(parameters, name + "_trend", 1, 25));
   TESSERA_ASSIGN_OR_RETURN(rule.range, FindNumber(parameters, name + "_range"));
   TESSERA_ASSIGN_OR_RETURN(rule.ridge, FindNumber(parameters, "ridge"));
+  TESSERA_ASSIGN_OR_RETURN(rule.bend, FindNumber(parameters, name + "_bend"));
   TESSERA_ASSIGN_OR_RETURN(rule.nugget, FindNumber(parameters, "nugget"));
+  TESSERA_ASSIGN_OR_RETURN(rule.detail, FindNumber(parameters, name + "_detail"));
+  TESSERA_ASSIGN_OR_RETURN(rule.detail_range, FindNumber(parameters, name + "_detail_range"));
   TESSERA_RETURN_IF_ERROR(CheckResampleRule(rule));
   return Side{directions, max_theta_rad, DirectionGrid(max_theta_rad, nodes), rule};
 }

@@ -27,7 +27,7 @@
 
 namespace tessera {
 
-inline constexpr int kDfmfVersion = 1;
+inline constexpr int kDfmfVersion = 2;
 
 // Limits of what is decoded: nodes along the side of a grid, directions of a set (resampling solves a system
 // of that size), and values of the resampled factors, 1 GiB of them.

@@ -4,11 +4,13 @@
 #include <cmath>
 #include <limits>
 #include <memory>
+#include <string>
 #include <utility>
 #include <vector>
 
 #include <absl/strings/str_cat.h>
 #include <Eigen/Core>
+#include <nlohmann/json.hpp>
 
 #include "btf/base/parallel.h"
 #include "btf/base/status_macros.h"
@@ -16,12 +18,12 @@
 #include "btf/codec/dfmf/dfmf_decoder.h"
 #include "btf/codec/dfmf/direction_grid.h"
 #include "btf/codec/dfmf/rank_choice.h"
+#include "btf/codec/dfmf/resample_choice.h"
 #include "btf/codec/dfmf/sample_matrix.h"
 #include "btf/codec/dsh/coefficient_store.h"
 #include "btf/codec/encoder_input.h"
 #include "btf/codec/quantize.h"
 #include "btf/codec/row_passes.h"
-#include "btf/math/max_theta.h"
 
 namespace tessera {
 namespace {
@@ -78,38 +80,14 @@ absl::StatusOr<Ranges> ProjectTexels(const SampleMatrix& matrix, const Spaces& s
   return Ranges{{minima.begin(), minima.end()}, {maxima.begin(), maxima.end()}};
 }
 
-// Seven nodes for two measured directions: on wool with every fifth direction held out, more of them gain
-// less than a hundredth.
-int NodesPerSide(size_t num_directions) {
-  int n = 5;
-  while (n < 25 && static_cast<size_t>(2 * n) * n < 7 * num_directions) {
-    n += 2;
-  }
-  return n;
-}
-
-// A trend of a quarter as many functions as directions at most, and a covariance that reaches about two
-// directions far. Both, and the nugget, were chosen on wool: longer ranges and larger nuggets bring held-out
-// directions down by up to 4% of their error, and take measured ones up by 20%.
-ResampleRule RuleFor(const std::vector<Direction>& directions) {
-  const double count = static_cast<double>(directions.size());
-  ResampleRule rule;
-  rule.trend = count >= 64 ? 16 : count >= 36 ? 9 : count >= 16 ? 4 : 1;
-  rule.range = std::clamp(4.5 / std::sqrt(count), 0.1, 2.0);
-  return rule;
-}
-
-// What decodes at the measured directions from unit values there, [directions][directions].
-Eigen::MatrixXd Smoothing(const std::vector<Direction>& directions) {
-  const DirectionGrid grid(MaxThetaRad(directions), NodesPerSide(directions.size()));
-  const Eigen::MatrixXd resample = ResampleMatrix(grid, directions, RuleFor(directions));
-  Eigen::MatrixXd smoothing(resample.cols(), resample.cols());
-  for (Eigen::Index i = 0; i < smoothing.rows(); ++i) {
-    const DirectionGrid::Stencil at = grid.Find(VectorFromDirection(directions[i]));
-    smoothing.row(i) = at.weights[0] * resample.row(at.nodes[0]) + at.weights[1] * resample.row(at.nodes[1]) +
-                       at.weights[2] * resample.row(at.nodes[2]);
-  }
-  return smoothing;
+void AddSideParameters(const std::string& name, size_t num_directions, const ResampleRule& rule,
+                       nlohmann::json& parameters) {
+  parameters[name + "_nodes"] = ResampleNodesPerSide(num_directions);
+  parameters[name + "_trend"] = rule.trend;
+  parameters[name + "_bend"] = rule.bend;
+  parameters[name + "_range"] = rule.range;
+  parameters[name + "_detail"] = rule.detail;
+  parameters[name + "_detail_range"] = rule.detail_range;
 }
 
 void AddTables(const Spaces& spaces, const Choice& choice, int64_t num_views, int64_t num_lights,
@@ -201,10 +179,6 @@ absl::StatusOr<Material> EncodeDfmf(BtfSource& source, const EncodeParams& param
   TESSERA_ASSIGN_OR_RETURN(const Eigen::Matrix3d moments, ColourMoments(info, passes, context));
   const Eigen::Matrix3f axes = ColourAxes(moments);
   const SampleMatrix matrix(info.width, pairs, axes, context);
-  const ResampleRule light_rule = RuleFor(info.lights);
-  const ResampleRule view_rule = RuleFor(info.views);
-  const Smoothings smoothings{Smoothing(info.lights), Smoothing(info.views)};
-
   Goal goal = GoalOf(params, info);
   while (true) {
     TESSERA_ASSIGN_OR_RETURN(const Spaces spaces,
@@ -214,6 +188,10 @@ absl::StatusOr<Material> EncodeDfmf(BtfSource& source, const EncodeParams& param
                              CoefficientStore::Create(num_texels * candidates, params.memory_budget_bytes / 2,
                                                       params.spill_folder));
     TESSERA_ASSIGN_OR_RETURN(const Ranges ranges, ProjectTexels(matrix, spaces, *store, info.width, passes));
+    const SideGrams grams = MakeSideGrams(spaces, num_views, num_lights);
+    const ResampleRule light_rule = ChooseResampleRule(info.lights, grams.light);
+    const ResampleRule view_rule = ChooseResampleRule(info.views, grams.view);
+    const Smoothings smoothings{Smoothing(info.lights, light_rule), Smoothing(info.views, view_rule)};
     const Choice choice =
         Choose(spaces, smoothings, Spans(ranges), moments.trace(), info, params, goal.budget);
     const double rmse = std::sqrt(std::max(0.0, choice.ranks.squared_error) / num_samples);
@@ -243,14 +221,9 @@ absl::StatusOr<Material> EncodeDfmf(BtfSource& source, const EncodeParams& param
     BtfelTable& table = material.btfels;
     table.codec_id = "dfmf";
     table.codec_version = kDfmfVersion;
-    table.parameters = {{"light_nodes", NodesPerSide(info.lights.size())},
-                        {"view_nodes", NodesPerSide(info.views.size())},
-                        {"light_trend", light_rule.trend},
-                        {"view_trend", view_rule.trend},
-                        {"light_range", light_rule.range},
-                        {"view_range", view_rule.range},
-                        {"ridge", light_rule.ridge},
-                        {"nugget", light_rule.nugget}};
+    table.parameters = {{"ridge", light_rule.ridge}, {"nugget", light_rule.nugget}};
+    AddSideParameters("light", info.lights.size(), light_rule, table.parameters);
+    AddSideParameters("view", info.views.size(), view_rule, table.parameters);
     table.views = info.views;
     table.lights = info.lights;
     CodecTable colour{{3, 3}, {}};

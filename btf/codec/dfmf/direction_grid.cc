@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cassert>
 #include <cmath>
-#include <utility>
+#include <tuple>
 
 #include <absl/strings/str_cat.h>
 #include <Eigen/Cholesky>
@@ -26,8 +26,8 @@ Eigen::MatrixXd StencilMatrix(const DirectionGrid& grid, const std::vector<Direc
   return b;
 }
 
-double Matern(double chord, double range) {
-  const double d = std::sqrt(3.0) * chord / range;
+double Matern(double distance) {
+  const double d = std::sqrt(3.0) * distance;
   return (1.0 + d) * std::exp(-d);
 }
 
@@ -92,14 +92,27 @@ absl::Status CheckResampleRule(const ResampleRule& rule) {
   // Below the least ridge or nugget the systems cannot be solved to single precision.
   constexpr double kLeast = 1e-6;
   constexpr double kMost = 1e6;
-  for (const auto& [name, value] :
-       {std::pair("ridge", rule.ridge), std::pair("range", rule.range), std::pair("nugget", rule.nugget)}) {
-    if (!(value >= kLeast && value <= kMost)) {
-      return absl::InvalidArgumentError(
-          absl::StrCat(name, " = ", value, ", expected ", kLeast, " to ", kMost));
+  constexpr double kLeastBend = 0.1;
+  for (const auto& [name, value, least, most] :
+       {std::tuple("ridge", rule.ridge, kLeast, kMost), std::tuple("bend", rule.bend, kLeastBend, kMaxBend),
+        std::tuple("range", rule.range, kLeast, kMost), std::tuple("detail", rule.detail, 0.0, kMost),
+        std::tuple("detail_range", rule.detail_range, kLeast, kMost),
+        std::tuple("nugget", rule.nugget, kLeast, kMost)}) {
+    if (!(value >= least && value <= most)) {
+      return absl::InvalidArgumentError(absl::StrCat(name, " = ", value, ", expected ", least, " to ", most));
     }
   }
   return absl::OkStatus();
+}
+
+Eigen::Vector2d BentPoint(const Eigen::Vector3d& direction, double bend) {
+  const double sine = std::hypot(direction.x(), direction.y());
+  const double radius = std::tan(bend * std::atan2(sine, std::max(direction.z(), 0.0))) / bend;
+  return sine > 0.0 ? Eigen::Vector2d(direction.head<2>() * (radius / sine)) : Eigen::Vector2d::Zero();
+}
+
+double ResampleCovariance(double distance, const ResampleRule& rule) {
+  return Matern(distance / rule.range) + rule.detail * Matern(distance / rule.detail_range);
 }
 
 Eigen::MatrixXd ResampleMatrix(const DirectionGrid& grid, const std::vector<Direction>& directions,
@@ -118,10 +131,14 @@ Eigen::MatrixXd ResampleMatrix(const DirectionGrid& grid, const std::vector<Dire
   const double ridge = rule.ridge * static_cast<double>(m) / (2.0 * kPi);
   const Eigen::MatrixXd trend = y * (by.transpose() * by + ridge * gram).llt().solve(by.transpose());
 
+  Eigen::Matrix2Xd points(2, grid.num_nodes());
+  for (int i = 0; i < grid.num_nodes(); ++i) {
+    points.col(i) = BentPoint(nodes.col(i), rule.bend);
+  }
   Eigen::MatrixXd covariance(grid.num_nodes(), grid.num_nodes());
   for (int i = 0; i < grid.num_nodes(); ++i) {
-    for (int j = 0; j < grid.num_nodes(); ++j) {
-      covariance(i, j) = Matern((nodes.col(i) - nodes.col(j)).norm(), rule.range);
+    for (int j = 0; j <= i; ++j) {
+      covariance(i, j) = covariance(j, i) = ResampleCovariance((points.col(i) - points.col(j)).norm(), rule);
     }
   }
   const Eigen::MatrixXd kb = covariance * b.transpose();

@@ -58,15 +58,29 @@ class DirectionGrid {
 
 // How node values come from measured ones; recorded in the codec's parameters.
 struct ResampleRule {
-  int trend = 16;        // spherical harmonics of the trend: 1, 4, 9, 16 or 25
-  double ridge = 0.01;   // of the trend, in units of its Gram matrix over the hemisphere; > 0
-  double range = 0.5;    // of the Matern 3/2 covariance, as a chord of the unit sphere; > 0
-  double nugget = 0.01;  // variance of noise at a measured direction, in units of the covariance at 0; > 0
+  int trend = 16;       // spherical harmonics of the trend: 1, 4, 9, 16 or 25
+  double ridge = 0.01;  // of the trend, in units of its Gram matrix over the hemisphere; > 0
+  // Directions are compared in the plane, at tan(bend theta) / bend from its centre: bend 1 is where the view
+  // ray meets a plane below, which is how relief shifts with the view. In [0.1, kMaxBend].
+  double bend = 0.5;
+  double range = 1.0;    // of what directions share, in that plane; > 0
+  double detail = 0.03;  // variance of what each direction has for itself, over that of the former; >= 0
+  double detail_range = 0.15;  // how far it reaches; > 0
+  double nugget = 3e-4;        // variance of noise at a measured direction, in the same units; > 0
 };
 
+// At the horizon tan is then 6.3.
+inline constexpr double kMaxBend = 0.9;
+
+// The point of the plane above where `direction`, a unit vector with z >= 0, is compared.
+[[nodiscard]] Eigen::Vector2d BentPoint(const Eigen::Vector3d& direction, double bend);
+// Covariance of two directions `distance` apart in that plane: with k(s) = (1 + sqrt(3) s) exp(-sqrt(3) s),
+// the Matern function 3/2, k(distance / range) + detail k(distance / detail_range).
+[[nodiscard]] double ResampleCovariance(double distance, const ResampleRule& rule);
+
 // [nodes][directions]: node values from measured ones. With B [directions][nodes] the barycentric weights at
-// the directions, Y the harmonics at the nodes, K the covariance k(d) = (1 + sqrt(3) d / range) exp(-sqrt(3)
-// d / range) of nodes at a chord d, and G the Gram matrix of the harmonics over the hemisphere,
+// the directions, Y the harmonics at the nodes, K the nodes' ResampleCovariance and G the Gram matrix of the
+// harmonics over the hemisphere,
 //
 //   C = (Y^T B^T B Y + ridge m / (2 pi) G)^-1 Y^T B^T                  trend coefficients from m samples
 //   result = Y C + K B^T (B K B^T + nugget I)^-1 (I - B Y C)

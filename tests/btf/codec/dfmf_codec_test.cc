@@ -383,10 +383,12 @@ TEST(DfmfDecoderTest, RefusesTablesThatDoNotFit) {
   expect("trend = 5", [](BtfelTable& t) { t.parameters["view_trend"] = 5; });
   expect("nugget", [](BtfelTable& t) { t.parameters["nugget"] = 0.0; });
   expect("range", [](BtfelTable& t) { t.parameters["light_range"] = "wide"; });
+  expect("bend", [](BtfelTable& t) { t.parameters["view_bend"] = 1.0; });
+  expect("light_detail", [](BtfelTable& t) { t.parameters.erase("light_detail"); });
   expect("views", [](BtfelTable& t) { t.views.clear(); });
   expect("lights", [](BtfelTable& t) { t.lights.resize(3000, {0.0, 0.0}); });
   BtfelTable table = good;
-  table.codec_version = 2;
+  table.codec_version = 1;
   EXPECT_EQ(MakeDecoder(table).status().code(), absl::StatusCode::kUnimplemented);
 }
 

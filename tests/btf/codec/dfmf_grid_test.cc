@@ -123,7 +123,11 @@ TEST(ResampleMatrixTest, RefusesRulesOutOfRange) {
   EXPECT_TRUE(CheckResampleRule({}).ok());
   EXPECT_FALSE(CheckResampleRule({.trend = 36}).ok());
   EXPECT_FALSE(CheckResampleRule({.ridge = 0.0}).ok());
+  EXPECT_FALSE(CheckResampleRule({.bend = 0.0}).ok());
+  EXPECT_FALSE(CheckResampleRule({.bend = 1.0}).ok());
   EXPECT_FALSE(CheckResampleRule({.range = -1.0}).ok());
+  EXPECT_FALSE(CheckResampleRule({.detail = -0.1}).ok());
+  EXPECT_FALSE(CheckResampleRule({.detail_range = 0.0}).ok());
   EXPECT_FALSE(CheckResampleRule({.nugget = std::nan("")}).ok());
 }
 
