@@ -41,6 +41,15 @@ class Decoder {
   // runs when either is at or below the horizon.
   [[nodiscard]] virtual LinearForm Form(const Eigen::Vector3d& light, const Eigen::Vector3d& view) const = 0;
 
+  // The light side of BTFels in spherical harmonics, for light in the frequency domain: element i < n is the
+  // integral over all directions of light of Y_i(light) times the value under that light and `view`, before
+  // the clamp at 0, again as a linear function of the coefficients. All elements have the same runs; none at
+  // all where the view is at or below the horizon. With an environment sum of L_i Y_i in the BTFel's own
+  // frame, the sum over i of L_i times the values of element i is pi times the radiance, and exact for it.
+  // `view` is as in Form(); n is a legal count (math/spherical_harmonics.h). The first call integrates over
+  // the lights (light_harmonics.h), tens of milliseconds.
+  [[nodiscard]] virtual std::vector<LinearForm> LightHarmonics(int n, const Eigen::Vector3d& view) const = 0;
+
   [[nodiscard]] int num_coefficients() const { return static_cast<int>(offset_.size()); }
   // values[i] = offset[i] + step[i] * codes[i]; both spans have k elements.
   void Dequantize(std::span<const uint8_t> codes, std::span<double> values) const;

@@ -11,7 +11,9 @@
 #include <absl/strings/str_join.h>
 
 #include "btf/base/status_macros.h"
+#include "btf/codec/light_harmonics.h"
 #include "btf/math/max_theta.h"
+#include "btf/math/spherical_harmonics.h"
 
 namespace tessera {
 namespace {
@@ -93,12 +95,12 @@ absl::StatusOr<DfmfDecoder::Side> DfmfDecoder::MakeSide(const std::vector<Direct
   }
   ResampleRule rule;
   TESSERA_ASSIGN_OR_RETURN(rule.trend, FindInteger(parameters, name + "_trend", 1, 25));
-  TESSERA_ASSIGN_OR_RETURN(rule.range, FindNumber(parameters, name + "_range"));
-  TESSERA_ASSIGN_OR_RETURN(rule.ridge, FindNumber(parameters, "ridge"));
   TESSERA_ASSIGN_OR_RETURN(rule.bend, FindNumber(parameters, name + "_bend"));
-  TESSERA_ASSIGN_OR_RETURN(rule.nugget, FindNumber(parameters, "nugget"));
+  TESSERA_ASSIGN_OR_RETURN(rule.range, FindNumber(parameters, name + "_range"));
   TESSERA_ASSIGN_OR_RETURN(rule.detail, FindNumber(parameters, name + "_detail"));
   TESSERA_ASSIGN_OR_RETURN(rule.detail_range, FindNumber(parameters, name + "_detail_range"));
+  TESSERA_ASSIGN_OR_RETURN(rule.ridge, FindNumber(parameters, "ridge"));
+  TESSERA_ASSIGN_OR_RETURN(rule.nugget, FindNumber(parameters, "nugget"));
   TESSERA_RETURN_IF_ERROR(CheckResampleRule(rule));
   return Side{directions, max_theta_rad, DirectionGrid(max_theta_rad, nodes), rule};
 }
@@ -225,11 +227,47 @@ bool DfmfDecoder::Factors(const Eigen::Vector3d& light, const Eigen::Vector3d& v
 }
 
 LinearForm DfmfDecoder::Form(const Eigen::Vector3d& light, const Eigen::Vector3d& view) const {
-  LinearForm form;
   std::vector<double> factors(num_factors());
-  if (!Factors(light, view, factors)) {
-    return form;
+  return Factors(light, view, factors) ? FormOf(factors) : LinearForm{};
+}
+
+std::vector<LinearForm> DfmfDecoder::LightHarmonics(int n, const Eigen::Vector3d& view) const {
+  assert(IsShFunctionCount(n));
+  std::call_once(is_integrated_, [this] {
+    light_integrals_ = LightHarmonicIntegrals(light_.grid.num_nodes(), light_.max_theta_rad,
+                                              [this](const Eigen::Vector3d& light, std::span<double> values) {
+                                                const double scale =
+                                                    LightScale(light.z(), light_.max_theta_rad);
+                                                const DirectionGrid::Stencil at = light_.grid.Find(light);
+                                                for (int corner = 0; corner < 3; ++corner) {
+                                                  values[at.nodes[corner]] += scale * at.weights[corner];
+                                                }
+                                              });
+  });
+  std::vector<LinearForm> forms(n);
+  if (view.z() <= 0.0) {
+    return forms;
   }
+  const DirectionGrid::Stencil v = view_.grid.Find(view);
+  const Eigen::Index k = num_factors();
+  Eigen::MatrixXd factors = Eigen::MatrixXd::Zero(k, n);
+  for (int node = 0; node < light_.grid.num_nodes(); ++node) {
+    Eigen::VectorXd at_view = Eigen::VectorXd::Zero(k);
+    for (int corner = 0; corner < 3; ++corner) {
+      const size_t pair = static_cast<size_t>(node) * view_.grid.num_nodes() + v.nodes[corner];
+      at_view +=
+          v.weights[corner] * Eigen::Map<const Eigen::VectorXf>(grid().data() + pair * k, k).cast<double>();
+    }
+    factors.noalias() += at_view * light_integrals_.row(node).head(n);
+  }
+  for (int i = 0; i < n; ++i) {
+    forms[i] = FormOf(std::span(factors.col(i).data(), static_cast<size_t>(k)));
+  }
+  return forms;
+}
+
+LinearForm DfmfDecoder::FormOf(std::span<const double> factors) const {
+  LinearForm form;
   const size_t r = luma_rank_;
   const size_t q = chroma_rank_;
   form.weights.reserve(3 * (r + q));

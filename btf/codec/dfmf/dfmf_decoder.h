@@ -69,6 +69,7 @@ class DfmfDecoder final : public Decoder {
   bool Factors(const Eigen::Vector3d& light, const Eigen::Vector3d& view, std::span<double> factors) const;
 
   [[nodiscard]] LinearForm Form(const Eigen::Vector3d& light, const Eigen::Vector3d& view) const override;
+  [[nodiscard]] std::vector<LinearForm> LightHarmonics(int n, const Eigen::Vector3d& view) const override;
 
  private:
   struct Side {  // lights or views
@@ -87,6 +88,9 @@ class DfmfDecoder final : public Decoder {
   void TakeFactors(std::span<const float> codes, std::span<const float> offset, std::span<const float> step,
                    int first);
 
+  // Weights of coefficients from the factors of a pair.
+  [[nodiscard]] LinearForm FormOf(std::span<const double> factors) const;
+
   int luma_rank_ = 0;
   int chroma_rank_ = 0;
   Eigen::Matrix3d colour_ = Eigen::Matrix3d::Identity();
@@ -95,6 +99,8 @@ class DfmfDecoder final : public Decoder {
   std::vector<float> samples_;  // [view][light][num_factors()]
   mutable std::once_flag is_resampled_;
   mutable std::vector<float> grid_;
+  mutable std::once_flag is_integrated_;
+  mutable Eigen::MatrixXd light_integrals_;  // [light nodes][kMaxShFunctions]
 };
 
 }  // namespace tessera

@@ -10,6 +10,7 @@
 #include <absl/strings/str_join.h>
 
 #include "btf/base/status_macros.h"
+#include "btf/codec/light_harmonics.h"
 #include "btf/math/max_theta.h"
 #include "btf/math/spherical_harmonics.h"
 
@@ -130,14 +131,41 @@ void DshDecoder::ViewWeights(const Eigen::Vector3d& view, std::span<double> weig
 }
 
 LinearForm DshDecoder::Form(const Eigen::Vector3d& light, const Eigen::Vector3d& view) const {
-  LinearForm form;
   if (light.z() <= 0.0 || view.z() <= 0.0) {
-    return form;
+    return {};
   }
   std::array<double, kMaxShFunctions> light_weights{};
   std::array<double, kMaxShFunctions> view_weights{};
   LightWeights(light, std::span(light_weights).first(kl()));
   ViewWeights(view, std::span(view_weights).first(kv()));
+  return FormOf(light_weights, view_weights);
+}
+
+std::vector<LinearForm> DshDecoder::LightHarmonics(int n, const Eigen::Vector3d& view) const {
+  assert(IsShFunctionCount(n));
+  std::call_once(is_integrated_, [this] {
+    light_integrals_ = LightHarmonicIntegrals(kl(), light_limit_.theta_rad,
+                                              [this](const Eigen::Vector3d& light, std::span<double> values) {
+                                                LightWeights(light, values);
+                                              })
+                           .transpose();
+  });
+  std::vector<LinearForm> forms(n);
+  std::array<double, kMaxShFunctions> view_weights{};
+  if (view.z() <= 0.0) {
+    return forms;
+  }
+  ViewWeights(view, std::span(view_weights).first(kv()));
+  for (int i = 0; i < n; ++i) {
+    const Eigen::VectorXd light_weights = light_integrals_.row(i);
+    forms[i] = FormOf(std::span(light_weights.data(), kl()), view_weights);
+  }
+  return forms;
+}
+
+LinearForm DshDecoder::FormOf(std::span<const double> light_weights,
+                              std::span<const double> view_weights) const {
+  LinearForm form;
   form.weights.reserve(num_coefficients());
   for (int channel = 0; channel < 3; ++channel) {
     form.runs.push_back({channel, channel * kl() * kv(), kl() * kv()});

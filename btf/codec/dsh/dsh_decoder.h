@@ -12,6 +12,7 @@
 #pragma once
 
 #include <memory>
+#include <mutex>
 #include <span>
 #include <vector>
 
@@ -44,6 +45,7 @@ class DshDecoder final : public Decoder {
   void ViewWeights(const Eigen::Vector3d& view, std::span<double> weights) const;
 
   [[nodiscard]] LinearForm Form(const Eigen::Vector3d& light, const Eigen::Vector3d& view) const override;
+  [[nodiscard]] std::vector<LinearForm> LightHarmonics(int n, const Eigen::Vector3d& view) const override;
 
  private:
   struct PolarLimit {
@@ -57,6 +59,9 @@ class DshDecoder final : public Decoder {
   // Harmonics of the clamped direction in `basis`; false, and zeros, at or below the horizon.
   static bool Weights(const Eigen::Vector3d& direction, const PolarLimit& limit, const Eigen::MatrixXd& basis,
                       bool is_plain, std::span<double> weights);
+  // Weights of coefficients: products of light weights [kl] and view weights [kv].
+  [[nodiscard]] LinearForm FormOf(std::span<const double> light_weights,
+                                  std::span<const double> view_weights) const;
 
   Eigen::MatrixXd basis_light_;
   Eigen::MatrixXd basis_view_;
@@ -64,6 +69,8 @@ class DshDecoder final : public Decoder {
   bool is_view_plain_ = false;
   PolarLimit light_limit_;
   PolarLimit view_limit_;
+  mutable std::once_flag is_integrated_;
+  mutable Eigen::MatrixXd light_integrals_;  // [kMaxShFunctions][kl]
 };
 
 }  // namespace tessera

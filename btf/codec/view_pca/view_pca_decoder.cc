@@ -1,7 +1,9 @@
 #include "btf/codec/view_pca/view_pca_decoder.h"
 
 #include <algorithm>
+#include <cassert>
 #include <cmath>
+#include <numeric>
 #include <string>
 #include <utility>
 
@@ -9,6 +11,8 @@
 #include <absl/strings/str_join.h>
 
 #include "btf/base/status_macros.h"
+#include "btf/codec/light_harmonics.h"
+#include "btf/math/spherical_harmonics.h"
 
 namespace tessera {
 namespace {
@@ -127,13 +131,48 @@ ViewPcaDecoder::ViewPcaDecoder(const BtfelTable& table, int num_eigen_textures, 
       light_weights_(std::move(light_weights)) {}
 
 LinearForm ViewPcaDecoder::Form(const Eigen::Vector3d& light, const Eigen::Vector3d& view) const {
-  LinearForm form;
   if (light.z() <= 0.0 || view.z() <= 0.0) {
-    return form;
+    return {};
   }
-  const BarycentricWeights l = lights_.Locate(light);
+  BarycentricWeights at = lights_.Locate(light);
+  for (double& weight : at.weight) {
+    weight *= LightScale(light);
+  }
+  return FormOf(at.index, at.weight, view);
+}
+
+double ViewPcaDecoder::LightScale(const Eigen::Vector3d& light) const {
+  return light.z() < lights_.cos_limit() ? light.z() / lights_.cos_limit() : 1.0;
+}
+
+std::vector<LinearForm> ViewPcaDecoder::LightHarmonics(int n, const Eigen::Vector3d& view) const {
+  assert(IsShFunctionCount(n));
+  std::call_once(is_integrated_, [this] {
+    light_integrals_ = LightHarmonicIntegrals(num_lights_, std::acos(lights_.cos_limit()),
+                                              [this](const Eigen::Vector3d& light, std::span<double> values) {
+                                                const BarycentricWeights at = lights_.Locate(light);
+                                                for (int r = 0; r < 3; ++r) {
+                                                  values[at.index[r]] += LightScale(light) * at.weight[r];
+                                                }
+                                              });
+  });
+  std::vector<LinearForm> forms(n);
+  if (view.z() <= 0.0) {
+    return forms;
+  }
+  std::vector<int> all(num_lights_);
+  std::iota(all.begin(), all.end(), 0);
+  for (int i = 0; i < n; ++i) {
+    forms[i] = FormOf(all, std::span(light_integrals_.col(i).data(), all.size()), view);
+  }
+  return forms;
+}
+
+LinearForm ViewPcaDecoder::FormOf(std::span<const int> lights, std::span<const double> light_weights,
+                                  const Eigen::Vector3d& view) const {
+  LinearForm form;
   const BarycentricWeights v = views_.Locate(view);
-  const double scale = light.z() < lights_.cos_limit() ? light.z() / lights_.cos_limit() : 1.0;
+  const double scale = std::accumulate(light_weights.begin(), light_weights.end(), 0.0);
   const int run = num_eigen_textures_ + 1;
   std::vector<double> weights(run);
   for (int s = 0; s < 3; ++s) {
@@ -143,11 +182,11 @@ LinearForm ViewPcaDecoder::Form(const Eigen::Vector3d& light, const Eigen::Vecto
     weights[0] = scale * v.weight[s];
     for (int m = 0; m < num_eigen_textures_; ++m) {
       double sum = 0.0;
-      for (int r = 0; r < 3; ++r) {
-        const size_t row = static_cast<size_t>(v.index[s]) * num_lights_ + l.index[r];
-        sum += l.weight[r] * light_weights_[row * num_eigen_textures_ + m];
+      for (size_t r = 0; r < lights.size(); ++r) {
+        const size_t row = static_cast<size_t>(v.index[s]) * num_lights_ + lights[r];
+        sum += light_weights[r] * light_weights_[row * num_eigen_textures_ + m];
       }
-      weights[m + 1] = weights[0] * sum;
+      weights[m + 1] = v.weight[s] * sum;
     }
     for (int channel = 0; channel < 3; ++channel) {
       form.runs.push_back({channel, (v.index[s] * 3 + channel) * run, run});

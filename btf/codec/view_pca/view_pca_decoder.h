@@ -10,6 +10,8 @@
 #pragma once
 
 #include <memory>
+#include <mutex>
+#include <span>
 #include <vector>
 
 #include <absl/status/statusor.h>
@@ -41,10 +43,17 @@ class ViewPcaDecoder final : public Decoder {
   [[nodiscard]] const std::vector<float>& light_weights() const { return light_weights_; }
 
   [[nodiscard]] LinearForm Form(const Eigen::Vector3d& light, const Eigen::Vector3d& view) const override;
+  [[nodiscard]] std::vector<LinearForm> LightHarmonics(int n, const Eigen::Vector3d& view) const override;
 
  private:
   ViewPcaDecoder(const BtfelTable& table, int num_eigen_textures, HemisphereInterpolator lights,
                  HemisphereInterpolator views, std::vector<float> light_weights);
+
+  // What a light beyond the largest measured angle is scaled by.
+  [[nodiscard]] double LightScale(const Eigen::Vector3d& light) const;
+  // Weights of coefficients under a sum of measured lights: indices, and a weight for each.
+  [[nodiscard]] LinearForm FormOf(std::span<const int> lights, std::span<const double> light_weights,
+                                  const Eigen::Vector3d& view) const;
 
   int num_eigen_textures_;
   int num_views_;
@@ -52,6 +61,8 @@ class ViewPcaDecoder final : public Decoder {
   HemisphereInterpolator lights_;
   HemisphereInterpolator views_;
   std::vector<float> light_weights_;
+  mutable std::once_flag is_integrated_;
+  mutable Eigen::MatrixXd light_integrals_;  // [lights][kMaxShFunctions]
 };
 
 }  // namespace tessera
