@@ -16,11 +16,17 @@ constexpr double kNullEigenvalue = 1e-14;
 
 }  // namespace
 
-RidgeRegression::RidgeRegression(const Eigen::MatrixXd& basis) {
-  assert(basis.allFinite() && basis.size() > 0);
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(basis.transpose() * basis);
-  eigenvectors_ = eigen.eigenvectors();
-  projection_ = eigenvectors_.transpose() * basis.transpose();
+RidgeRegression::RidgeRegression(const Eigen::MatrixXd& basis, const Eigen::MatrixXd& penalty) {
+  assert(basis.allFinite() && basis.size() > 0 && penalty.rows() == basis.cols());
+  // Not by Cholesky: a penalty may be too badly conditioned for it.
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> root(penalty);
+  const double least = kNullEigenvalue * root.eigenvalues().maxCoeff();
+  const Eigen::MatrixXd w =
+      root.eigenvectors() * root.eigenvalues().cwiseMax(least).cwiseSqrt().cwiseInverse().asDiagonal();
+  const Eigen::MatrixXd z = basis * w;
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(z.transpose() * z);
+  back_ = w * eigen.eigenvectors();
+  projection_ = eigen.eigenvectors().transpose() * z.transpose();
   // The squared row norms are the eigenvalues; unlike the solver's they cannot be negative in a null space.
   eigenvalues_ = projection_.rowwise().squaredNorm();
 }
@@ -64,7 +70,7 @@ double RidgeRegression::ChooseRidge(const Eigen::Ref<const Eigen::MatrixXd>& sig
 Eigen::MatrixXd RidgeRegression::Fit(double ridge) const {
   const Eigen::VectorXd gains =
       (eigenvalues_.array() + ridge > 0.0).select((eigenvalues_.array() + ridge).inverse(), 0.0).matrix();
-  return eigenvectors_ * gains.asDiagonal() * projection_;
+  return back_ * gains.asDiagonal() * projection_;
 }
 
 Eigen::MatrixXd LeastSquaresFit(const Eigen::MatrixXd& basis, double relative_floor) {

@@ -1,13 +1,13 @@
 // Ridge regression with one ridge for many signals, chosen by generalised cross-validation.
 //
-// For samples f (M of them) and basis Y [M][n]: c = (Y^T Y + ridge I)^-1 Y^T f, a linear map for a given
-// ridge. The ridge is that of the least score
+// For samples f (M of them), basis Y [M][n] and a penalty R: c = (Y^T Y + ridge R)^-1 Y^T f, a linear map for
+// a given ridge. The ridge is that of the least score
 //
-//   GCV(ridge) = (sum over signals |f - Y c|^2) / (M - trace H)^2,   H = Y (Y^T Y + ridge I)^-1 Y^T,
+//   GCV(ridge) = (sum over signals |f - Y c|^2) / (M - trace H)^2,   H = Y (Y^T Y + ridge R)^-1 Y^T,
 //
 // the error of leaving out each sample in turn, made independent of the choice of coordinates (Golub, Heath
-// and Wahba 1979, Technometrics 21). With Y^T Y = Q diag(w) Q^T and p = Q^T Y^T f it takes sums over the
-// signals of p_i^2 and |f|^2 only.
+// and Wahba 1979, Technometrics 21). With R^-1 = W W^T, Z = Y W, Z^T Z = Q diag(w) Q^T and p = Q^T Z^T f it
+// takes sums over the signals of p_i^2 and |f|^2 only.
 //
 //   RidgeRegression regression(basis);
 //   const double ridge = regression.ChooseRidge(signals, 10.0);   // a sample of them is enough
@@ -28,8 +28,12 @@ class RidgeRegression {
   // taken, the closest to the samples. It also settles ties (one sample, signals that are 0).
   static constexpr double kScoreTolerance = 0.01;
 
-  // basis [M][n], both >= 1, finite; M < n is fine. Cost n^3.
-  explicit RidgeRegression(const Eigen::MatrixXd& basis);
+  // basis [M][n], both >= 1, finite; M < n is fine. penalty [n][n], symmetric,
+  // positive definite as far as double tells. Cost n^3.
+  RidgeRegression(const Eigen::MatrixXd& basis, const Eigen::MatrixXd& penalty);
+  // The identity as the penalty.
+  explicit RidgeRegression(const Eigen::MatrixXd& basis)
+      : RidgeRegression(basis, Eigen::MatrixXd::Identity(basis.cols(), basis.cols())) {}
 
   // One of the ridges above up to max_ridge (> kMinRidge, relative as well), absolute, for finite signals
   // [M][any number]. 0 when the basis is 0.
@@ -39,9 +43,9 @@ class RidgeRegression {
   [[nodiscard]] Eigen::MatrixXd Fit(double ridge) const;
 
  private:
-  Eigen::MatrixXd eigenvectors_;  // Q
-  Eigen::MatrixXd projection_;    // Q^T Y^T
-  Eigen::VectorXd eigenvalues_;   // w
+  Eigen::MatrixXd back_;         // W Q
+  Eigen::MatrixXd projection_;   // Q^T Z^T
+  Eigen::VectorXd eigenvalues_;  // w
 };
 
 // The pseudo-inverse of basis [M][n], [n][M]: plain least squares, the smallest coefficients of those that

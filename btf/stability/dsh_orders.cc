@@ -6,6 +6,7 @@
 
 #include <Eigen/Eigenvalues>
 
+#include "btf/codec/dsh/dsh_basis.h"
 #include "btf/codec/dsh/dsh_encoder.h"
 #include "btf/codec/dsh/dsh_fitter.h"
 #include "btf/math/ridge.h"
@@ -20,13 +21,13 @@ Eigen::MatrixXd BasisTable(const BtfelTable& table, const std::string& name) {
       .cast<double>();
 }
 
-double Condition(const Eigen::MatrixXd& basis, double ridge) {
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver(basis.transpose() * basis,
+double Condition(const Eigen::MatrixXd& basis, const Eigen::MatrixXd& penalty) {
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver(basis.transpose() * basis + penalty,
                                                               Eigen::EigenvaluesOnly);
-  const double largest = solver.eigenvalues().tail<1>()[0] + ridge;
+  const double largest = solver.eigenvalues().tail<1>()[0];
   // What double precision tells from 0.
   constexpr double kSmallestShare = 1e-16;
-  return largest / std::max(solver.eigenvalues()[0] + ridge, kSmallestShare * largest);
+  return largest / std::max(solver.eigenvalues()[0], kSmallestShare * largest);
 }
 
 }  // namespace
@@ -35,10 +36,12 @@ absl::StatusOr<UnroundedFit> FitUnrounded(const MemoryBtf& source, const Materia
                                           const EncodeParams& params) {
   const BtfInfo& info = source.info();
   const BtfelTable& table = material.btfels;
-  const Eigen::MatrixXd lights =
-      DshSamplesOfBasis(info.lights, params.kl) * BasisTable(table, "basis_light").transpose();
-  const Eigen::MatrixXd views =
-      DshSamplesOfBasis(info.views, params.kv) * BasisTable(table, "basis_view").transpose();
+  const Eigen::MatrixXd light_basis = BasisTable(table, "basis_light");
+  const Eigen::MatrixXd view_basis = BasisTable(table, "basis_view");
+  const Eigen::MatrixXd lights = DshSamplesOfBasis(info.lights, params.kl) * light_basis.transpose();
+  const Eigen::MatrixXd views = DshSamplesOfBasis(info.views, params.kv) * view_basis.transpose();
+  const Eigen::MatrixXd light_penalty = DshPenalty(light_basis);
+  const Eigen::MatrixXd view_penalty = DshPenalty(view_basis);
   const double light_ridge = table.parameters.value("ridge_light", 0.0);
   const double view_ridge = table.parameters.value("ridge_view", 0.0);
 
@@ -49,12 +52,13 @@ absl::StatusOr<UnroundedFit> FitUnrounded(const MemoryBtf& source, const Materia
     fitter = MakeLinearFitter(LeastSquaresFit(lights, kDshLsSingularFloor),
                               LeastSquaresFit(views, kDshLsSingularFloor));
   } else {
-    fitter =
-        MakeLinearFitter(RidgeRegression(lights).Fit(light_ridge), RidgeRegression(views).Fit(view_ridge));
+    fitter = MakeLinearFitter(RidgeRegression(lights, light_penalty).Fit(light_ridge),
+                              RidgeRegression(views, view_penalty).Fit(view_ridge));
   }
 
   UnroundedFit fit;
-  fit.condition = std::max(Condition(lights, light_ridge), Condition(views, view_ridge));
+  fit.condition =
+      std::max(Condition(lights, light_ridge * light_penalty), Condition(views, view_ridge * view_penalty));
   const size_t num_texels = static_cast<size_t>(info.width) * info.height;
   const size_t k = fitter->CoefficientsPerTexel();
   fit.coefficients.resize(num_texels * k);

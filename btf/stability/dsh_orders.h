@@ -14,8 +14,8 @@ namespace tessera {
 
 struct UnroundedFit {
   std::vector<float> coefficients;  // [texel][k], as the codes dequantise
-  // The larger of the two passes': of Y^T Y of the basis used at the measured directions, plus the ridge of
-  // "dsh" (in "dsh-cls" lambda differs from signal to signal and is left out).
+  // The larger of the two passes': of Y^T Y of the basis used at the measured directions, plus the ridge and
+  // penalty of "dsh" (in "dsh-cls" lambda differs from signal to signal and is left out).
   double condition = 0.0;
 };
 

@@ -53,4 +53,16 @@ Eigen::MatrixXd OrthonormalDshBasis(int n, DshArgument argument, double max_thet
   return basis;
 }
 
+Eigen::MatrixXd DshPenalty(const Eigen::MatrixXd& basis) {
+  const int n = static_cast<int>(basis.rows());
+  const HemisphereQuadrature quadrature = MakeHemisphereQuadrature(ShDegree(n));
+  // Laplacians of the functions at the nodes, [nodes][n].
+  Eigen::MatrixXd laplacian = ShMatrix(n, quadrature.directions);
+  for (int l = 0; l <= ShDegree(n); ++l) {
+    laplacian.middleCols(l * l, 2 * l + 1) *= l * (l + 1);
+  }
+  laplacian = (laplacian * basis.transpose()).eval();
+  return Eigen::MatrixXd::Identity(n, n) + kDshRoughness * GramMatrix(laplacian, quadrature.weights);
+}
+
 }  // namespace tessera

@@ -27,4 +27,18 @@ inline constexpr double kDshGramFloor = 1e-10;
 // exactly equal.
 [[nodiscard]] Eigen::MatrixXd OrthonormalDshBasis(int n, DshArgument argument, double max_theta_rad);
 
+// How much more than its size a function's roughness weighs, below.
+inline constexpr double kDshRoughness = 0.1;
+
+// What a fit in the functions y' = B y is penalised by, R [n][n] with
+//
+//   c^T R c = |c|^2 + kDshRoughness * integral over the hemisphere of (Laplacian of sum of c_i y'_i)^2,
+//
+// so that of all functions that pass near the samples the smoothest is taken: where rings of directions lie
+// further apart than the functions swing, the smallest one would be black in between. As the Laplacian of
+// Y(l, m) is -l (l + 1) Y(l, m), with D = diag(l (l + 1)) and G the harmonics' Gram matrix over the
+// hemisphere R = I + kDshRoughness B D G D B^T. `basis` is OrthonormalDshBasis's. Symmetric, positive
+// definite.
+[[nodiscard]] Eigen::MatrixXd DshPenalty(const Eigen::MatrixXd& basis);
+
 }  // namespace tessera

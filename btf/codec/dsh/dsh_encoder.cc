@@ -302,8 +302,10 @@ absl::StatusOr<Material> EncodeDsh(BtfSource& source, const EncodeParams& params
   TESSERA_RETURN_IF_ERROR(CheckInput(info, params));
   Eigen::MatrixXd basis_light = OrthonormalDshBasis(params.kl, DshArgument::kLight, MaxThetaRad(info.lights));
   Eigen::MatrixXd basis_view = OrthonormalDshBasis(params.kv, DshArgument::kView, MaxThetaRad(info.views));
-  const RidgeRegression light(DshSamplesOfBasis(info.lights, params.kl) * basis_light.transpose());
-  const RidgeRegression view(DshSamplesOfBasis(info.views, params.kv) * basis_view.transpose());
+  const RidgeRegression light(DshSamplesOfBasis(info.lights, params.kl) * basis_light.transpose(),
+                              DshPenalty(basis_light));
+  const RidgeRegression view(DshSamplesOfBasis(info.views, params.kv) * basis_view.transpose(),
+                             DshPenalty(basis_view));
   TESSERA_ASSIGN_OR_RETURN(const Eigen::MatrixXd samples, RidgeSamples(source, context));
   const double light_ridge = light.ChooseRidge(samples, kDshMaxRidge);
   const Eigen::MatrixXd light_fit = light.Fit(light_ridge);

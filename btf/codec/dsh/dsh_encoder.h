@@ -2,8 +2,9 @@
 //
 //   dsh-cls  constrained least squares: the coefficients' energy is bounded by the signal's
 //   dsh-ls   plain least squares; coefficients grow to 5e4 and do not survive 8 bits. Kept to show it.
-//   dsh      harmonics orthonormalised over the hemisphere (dsh_basis.h), one ridge a pass, chosen by
-//            generalised cross-validation (math/ridge.h) on up to 256 texels spread over the texture
+//   dsh      harmonics orthonormalised over the hemisphere, their size and roughness penalised (dsh_basis.h),
+//            one ridge a pass, chosen by generalised cross-validation (math/ridge.h) on up to 256 texels
+//            spread over the texture
 //
 // Rows of texels are streamed, groups of texels fitted at once (dsh_fitter.h). Source of the first:
 // [Leung2007] 3.1, 5 and appendix; the last is ours. One ridge a pass costs nothing and loses nothing: on the

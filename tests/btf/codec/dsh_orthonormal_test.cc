@@ -5,6 +5,7 @@
 
 #include <gtest/gtest.h>
 #include <Eigen/Cholesky>
+#include <Eigen/Geometry>
 #include <Eigen/SVD>
 
 #include "btf/codec/codec.h"
@@ -104,6 +105,44 @@ TEST(DshBasisTest, StaysFiniteWhereFunctionsCannotBeToldApart) {
   }
 }
 
+TEST(DshBasisTest, ThePenaltyIsSizeAndRoughness) {
+  const double limit = RadFromDeg(75.0);
+  const Eigen::MatrixXd basis = OrthonormalDshBasis(16, DshArgument::kView, limit);
+  const Eigen::MatrixXd penalty = DshPenalty(basis);
+  // One function with all degrees in it; its Laplacian by differences of second order along two great circles
+  // through each point of a midpoint rule.
+  Eigen::VectorXd c(16);
+  for (int i = 0; i < 16; ++i) {
+    c[i] = std::cos(1.7 * i);
+  }
+  const Eigen::VectorXd plain = basis.transpose() * c;
+  const auto value = [&](const Eigen::Vector3d& d) {
+    Eigen::VectorXd y(16);
+    EvaluateSh(d.normalized(), std::span(y.data(), 16));
+    return y.dot(plain);
+  };
+  constexpr int kPolar = 60;
+  constexpr int kAzimuths = 24;
+  constexpr double kStep = 1e-3;
+  double roughness = 0.0;
+  for (int i = 0; i < kPolar; ++i) {
+    for (int j = 0; j < kAzimuths; ++j) {
+      const Eigen::Vector3d d =
+          VectorFromDirection({std::acos((i + 0.5) / kPolar), 2.0 * kPi * j / kAzimuths});
+      const Eigen::Vector3d u = d.unitOrthogonal();
+      const Eigen::Vector3d v = d.cross(u);
+      double laplacian = -4.0 * value(d);
+      for (const Eigen::Vector3d& tangent : {u, v}) {
+        laplacian += value(std::cos(kStep) * d + std::sin(kStep) * tangent) +
+                     value(std::cos(kStep) * d - std::sin(kStep) * tangent);
+      }
+      laplacian /= kStep * kStep;
+      roughness += laplacian * laplacian * 2.0 * kPi / (kPolar * kAzimuths);
+    }
+  }
+  EXPECT_NEAR(c.dot(penalty * c), c.squaredNorm() + kDshRoughness * roughness, 5e-3 * c.dot(penalty * c));
+}
+
 TEST(DshOrthonormalTest, EqualsTheTwoPassesDoneSlowly) {
   SampledBtf btf = ShinyBtf(3, 2, RingDirections(4, 9), RingDirections(5, 9));
   const Material material = Encode("dsh", btf, {.kl = 16, .kv = 9});
@@ -116,10 +155,9 @@ TEST(DshOrthonormalTest, EqualsTheTwoPassesDoneSlowly) {
     }
     return Eigen::MatrixXd(ShMatrix(static_cast<int>(basis.rows()), vectors) * basis.transpose());
   };
-  const auto solve = [](const Eigen::MatrixXd& y, double ridge, const Eigen::MatrixXd& f) -> Eigen::MatrixXd {
-    return (y.transpose() * y + ridge * Eigen::MatrixXd::Identity(y.cols(), y.cols()))
-        .ldlt()
-        .solve(y.transpose() * f);
+  const auto solve = [](const Eigen::MatrixXd& y, const Eigen::MatrixXd& penalty,
+                        const Eigen::MatrixXd& f) -> Eigen::MatrixXd {
+    return (y.transpose() * y + penalty).ldlt().solve(y.transpose() * f);
   };
   const Eigen::MatrixXd yl = samples(table.lights, decoder->basis_light());
   const Eigen::MatrixXd yv = samples(table.views, decoder->basis_view());
@@ -127,6 +165,8 @@ TEST(DshOrthonormalTest, EqualsTheTwoPassesDoneSlowly) {
   const double view_ridge = table.parameters["ridge_view"];
   EXPECT_GT(light_ridge, 0.0);
   EXPECT_GT(view_ridge, 0.0);
+  const Eigen::MatrixXd light_penalty = light_ridge * DshPenalty(decoder->basis_light());
+  const Eigen::MatrixXd view_penalty = view_ridge * DshPenalty(decoder->basis_view());
   std::vector<double> values(table.num_coefficients);
   for (int texel = 0; texel < 6; ++texel) {
     decoder->Dequantize(table.btfel(texel), values);
@@ -138,7 +178,7 @@ TEST(DshOrthonormalTest, EqualsTheTwoPassesDoneSlowly) {
         }
       }
       const Eigen::MatrixXd c =
-          solve(yv, view_ridge, solve(yl, light_ridge, f).transpose()).transpose();  // [kl][kv]
+          solve(yv, view_penalty, solve(yl, light_penalty, f).transpose()).transpose();  // [kl][kv]
       for (int j = 0; j < 9; ++j) {
         for (int i = 0; i < 16; ++i) {
           const int index = (channel * 9 + j) * 16 + i;

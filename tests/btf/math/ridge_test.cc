@@ -39,6 +39,16 @@ TEST(RidgeRegressionTest, SolvesTheNormalEquations) {
   }
 }
 
+TEST(RidgeRegressionTest, WeighsThePenalty) {
+  const Eigen::MatrixXd y = Random(12, 9, 11);
+  const Eigen::MatrixXd root = Random(9, 9, 12);
+  const Eigen::MatrixXd penalty = root * root.transpose() + Eigen::MatrixXd::Identity(9, 9);
+  for (const double ridge : {1e-3, 0.1, 10.0}) {
+    const Eigen::MatrixXd expected = (y.transpose() * y + ridge * penalty).inverse() * y.transpose();
+    EXPECT_LT((RidgeRegression(y, penalty).Fit(ridge) - expected).norm(), 1e-9 * expected.norm()) << ridge;
+  }
+}
+
 // The definition, with the hat matrix written out, over the same ridges.
 double SlowChoice(const Eigen::MatrixXd& y, const Eigen::MatrixXd& f, double largest) {
   std::vector<double> ridges;
