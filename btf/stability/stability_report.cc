@@ -2,9 +2,9 @@
 
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_format.h>
-#include <absl/strings/str_join.h>
 #include <absl/strings/str_replace.h>
 
+#include "btf/report/page.h"
 #include "btf/stability/stability.h"
 
 namespace tessera {
@@ -23,6 +23,14 @@ constexpr std::array kColumns = {"case",
                                  "limit",
                                  "holds",
                                  "says"};
+
+constexpr char kTitle[] = "Where the codecs fail";
+constexpr char kStyle[] = R"(
+th { position: sticky; top: 0; }
+tr.case td { border-top: 2px solid #888; }
+tr.no td { background: #fbe3df; }
+td.says { max-width: 42em; color: #444; }
+)";
 
 std::string Figure(const std::optional<double>& value) {
   return value ? absl::StrFormat("%.4g", *value) : "";
@@ -44,44 +52,19 @@ std::array<std::string, kColumns.size()> Cells(const StabilityRow& row) {
           row.says};
 }
 
-std::string Quoted(const std::string& cell) {
-  return cell.find_first_of(",\"\n") == std::string::npos
-             ? cell
-             : absl::StrCat("\"", absl::StrReplaceAll(cell, {{"\"", "\"\""}}), "\"");
-}
-
-std::string Escaped(const std::string& text) {
-  return absl::StrReplaceAll(text, {{"&", "&amp;"}, {"<", "&lt;"}, {">", "&gt;"}});
-}
-
 }  // namespace
 
 std::string StabilityCsv(const std::vector<StabilityRow>& rows) {
-  std::string csv = absl::StrCat(absl::StrJoin(kColumns, ","), "\n");
+  std::string csv = CsvLine({kColumns.begin(), kColumns.end()});
   for (const StabilityRow& row : rows) {
-    std::array<std::string, kColumns.size()> cells = Cells(row);
-    for (std::string& cell : cells) {
-      cell = Quoted(cell);
-    }
-    absl::StrAppend(&csv, absl::StrJoin(cells, ","), "\n");
+    const std::array<std::string, kColumns.size()> cells = Cells(row);
+    csv += CsvLine({cells.begin(), cells.end()});
   }
   return csv;
 }
 
 std::string StabilityHtml(const std::vector<StabilityRow>& rows) {
-  std::string html = R"(<!DOCTYPE html>
-<html lang="en"><head><meta charset="utf-8"><title>Where the codecs fail</title>
-<style>
-body { font: 14px/1.45 system-ui, sans-serif; margin: 2em; color: #222; background: #fff; }
-table { border-collapse: collapse; }
-th { text-align: left; vertical-align: bottom; border-bottom: 2px solid #444; padding: .3em .7em; position: sticky; top: 0; background: #fff; }
-td { border-top: 1px solid #ddd; padding: .25em .7em; vertical-align: top; }
-td.figure { text-align: right; font-variant-numeric: tabular-nums; white-space: nowrap; }
-tr.case td { border-top: 2px solid #888; }
-tr.no td { background: #fbe3df; }
-td.says { max-width: 42em; color: #444; }
-</style></head><body>
-<h1>Where the codecs fail</h1>
+  std::string html = R"(<h1>Where the codecs fail</h1>
 <p>Errors are root mean squares over that of the truth, a bumpy glossy surface in closed form without the harm done to
 the samples: at the measured directions, and everywhere on both hemispheres, beyond the largest measured polar angle
 as the format extends it. The largest value is decoded, over the largest of the truth. A row holds when its error
@@ -101,13 +84,13 @@ everywhere stays below its limit, or when it is refused as promised; values are 
       const char* style = i + 1 == cells.size() ? " class=\"says\""
                           : i >= 4 && i <= 10   ? " class=\"figure\""
                                                 : "";
-      absl::StrAppend(&html, "<td", style, ">", is_repeated ? "" : Escaped(cells[i]), "</td>");
+      absl::StrAppend(&html, "<td", style, ">", is_repeated ? "" : HtmlEscaped(cells[i]), "</td>");
     }
     html += "</tr>\n";
     previous = row.stress;
   }
-  html += "</tbody></table></body></html>\n";
-  return html;
+  html += "</tbody></table>\n";
+  return HtmlPage(kTitle, kStyle, html);
 }
 
 }  // namespace tessera
