@@ -7,7 +7,6 @@
 #include <array>
 #include <cstdio>
 #include <cstdlib>
-#include <ctime>
 #include <functional>
 #include <limits>
 #include <memory>
@@ -17,6 +16,7 @@
 
 #include <Eigen/Core>
 
+#include "btf/base/cpu_time.h"
 #include "btf/base/rng.h"
 #include "btf/codec/codec.h"
 #include "btf/codec/decoder.h"
@@ -28,18 +28,12 @@ namespace {
 constexpr double kLeastShare = 0.4;
 constexpr int kRounds = 7;
 
-double ThreadSeconds() {
-  timespec time{};
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &time);
-  return static_cast<double>(time.tv_sec) + 1e-9 * static_cast<double>(time.tv_nsec);
-}
-
 double BestSeconds(const std::function<void()>& work) {
   double best = std::numeric_limits<double>::infinity();
   for (int round = 0; round < kRounds; ++round) {
-    const double start = ThreadSeconds();
+    const double start = ThreadCpuSeconds();
     work();
-    best = std::min(best, ThreadSeconds() - start);
+    best = std::min(best, ThreadCpuSeconds() - start);
   }
   return best;
 }
