@@ -32,9 +32,8 @@ class Scale {
     if (!(range.least <= range.most)) {
       range = {1.0, 10.0};
     }
-    if (axis.most && range.most > *axis.most) {
-      range.most = std::max(*axis.most, range.least);
-    }
+    range.least = axis.from.value_or(range.least);
+    range.most = std::max(axis.to.value_or(range.most), range.least);
     if (axis.scale == AxisScale::kLog) {
       constexpr double kMargin = 1.18;  // of the range's ends
       low_ = std::log10(range.least / kMargin);

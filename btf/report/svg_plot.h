@@ -19,8 +19,9 @@ struct PlotAxis {
   std::string label;  // with its unit
   AxisUnit unit = AxisUnit::kNumber;
   AxisScale scale = AxisScale::kLog;
-  // Points beyond are drawn at the edge, as arrows.
-  std::optional<double> most;
+  // Where the axis begins and ends; absent: at the points. Points beyond the end are drawn there, as arrows.
+  std::optional<double> from;
+  std::optional<double> to;
   // Values marked on the axis; empty: round ones.
   std::vector<double> ticks;
 };

@@ -16,6 +16,7 @@ void AddMeshCommands(CLI::App& app, Session& session);
 void AddPreviewCommand(CLI::App& app, Session& session);
 void AddSheetCommand(CLI::App& app, Session& session);
 void AddStabilityCommand(CLI::App& app, Session& session);
+void AddChartCommand(CLI::App& app, Session& session);
 void AddJobCommands(CLI::App& app, Session& session);
 void AddServerCommands(CLI::App& app, Session& session);
 void AddCompletionCommand(CLI::App& app, Session& session);

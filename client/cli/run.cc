@@ -38,6 +38,7 @@ int RunTessera(int argc, const char* const* argv, std::stop_token stop) {
   AddPreviewCommand(app, session);
   AddSheetCommand(app, session);
   AddStabilityCommand(app, session);
+  AddChartCommand(app, session);
   AddJobCommands(app, session);
   AddServerCommands(app, session);
   AddCompletionCommand(app, session);

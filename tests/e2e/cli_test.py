@@ -1,11 +1,13 @@
 """The command line as a newcomer meets it: every noun once, through a real socket, from generating a material to the
 pictures of a re-dressed mesh."""
 
+import csv
 import json
 import os
 import re
 import signal
 import subprocess
+import xml.etree.ElementTree
 
 import harness
 from harness import decode_png
@@ -19,11 +21,11 @@ REDRESS_LIMIT_MS = 10
 class NoServerTest(harness.unittest.TestCase):
     """What works, and what is said, where no server is."""
 
-    def tessera(self, *words, **variables):
+    def tessera(self, *words, timeout=60, **variables):
         environment = {key: value for key, value in os.environ.items() if key != "TESSERA_SERVER"}
         command = [harness.options.bin / "tessera", *words]
         return harness.Result(command, subprocess.run(command, env=dict(environment, **variables), text=True,
-                                                      capture_output=True, timeout=60))
+                                                      capture_output=True, timeout=timeout))
 
     def test_no_server_is_3_and_tells_how_to_start_one(self):
         result = self.tessera("server", "status", "--server", "127.0.0.1:1")
@@ -93,6 +95,55 @@ class NoServerTest(harness.unittest.TestCase):
             self.assertEqual(unwritable.code, 4, unwritable)
             # Nothing half-written, whatever happened.
             self.assertEqual(sorted(path.name for path in folder.iterdir()), ["torus.tsra", "triangle.obj"])
+        finally:
+            harness.shutil.rmtree(folder)
+
+
+    def test_charts_need_no_server(self):
+        folder = harness.pathlib.Path(harness.tempfile.mkdtemp(prefix="tessera-e2e-"))
+        try:
+            source = "generated:weave,size=32,views=2x5,lights=2x5,area-samples=1,bounces=0"
+            made = self.tessera("chart", "codecs", source, "--quick", "-o", str(folder / "new" / "chart"), "--json",
+                                timeout=280, TESSERA_SERVER="127.0.0.1:1")
+            self.assertEqual(made.code, 0, made)
+            page, table = folder / "new" / "chart" / "codecs.html", folder / "new" / "chart" / "codecs.csv"
+            self.assertEqual(made.json()["files"], [str(page), str(table)])
+            with table.open(newline="") as rows:
+                rows = list(csv.DictReader(rows))
+            self.assertEqual({row["source"] for row in rows}, {source})
+            self.assertEqual({row["split"] for row in rows}, {"sampled", "held-out lights", "held-out views"})
+            self.assertGreaterEqual({row["method"] for row in rows}, {"dsh", "dsh-cls", "dfmf", "view-pca", "JPEG images"})
+            self.assertTrue(all(0 < float(row["rmse"]) and 0 < int(row["bytes"]) for row in rows), rows)
+
+            root = xml.etree.ElementTree.fromstring(page.read_text())
+            self.assertEqual(root.tag, "html")
+            # 3 metrics of 3 splits against 3 costs, 3 plots by angle.
+            plots = [e for e in root.iter("{http://www.w3.org/2000/svg}svg") if e.get("class") == "plot"]
+            self.assertEqual(len(plots), 3 * 3 * 3 + 3)
+            pictures = [e.get("src") for e in root.iter("img")]
+            self.assertGreater(len(pictures), 20)
+            self.assertTrue(all(src.startswith("data:image/png;base64,") for src in pictures))
+            self.assertEqual([e for e in root.iter() if e.get("href") or e.tag in ("script", "link")], [])
+        finally:
+            harness.shutil.rmtree(folder)
+
+    def test_charts_say_what_is_wrong(self):
+        folder = harness.pathlib.Path(harness.tempfile.mkdtemp(prefix="tessera-e2e-"))
+        try:
+            output = str(folder / "chart")
+            (folder / "file").write_text("")
+            for code, says, words in ((2, "no SOURCE", ["-o", output]),
+                                      (2, "twice", ["generated:weave", "generated:weave", "-o", output]),
+                                      (5, "reactdiffuse", ["generated:marble", "-o", output]),
+                                      (5, "colour-scale", ["generated:weave,colour-scale=2", "-o", output]),
+                                      (4, "no such folder or file", [str(folder / "none"), "-o", output]),
+                                      (3, "no server", ["wool", "-o", output, "--server", "127.0.0.1:1"]),
+                                      (5, "file", ["generated:weave", "-o", str(folder / "file")])):
+                result = self.tessera("chart", "codecs", *words)
+                self.assertEqual(result.code, code, result)
+                self.assertIn(says, result.err)
+                self.assertEqual(result.out, "")
+            self.assertFalse((folder / "chart" / "codecs.html").exists())
         finally:
             harness.shutil.rmtree(folder)
 
@@ -267,6 +318,9 @@ class MainJobTest(harness.CommandTest):
             self.run_ok("material", "decode", name, "--light", "30,40", "--view", "20,10", "-o", f"{name}.png")
         self.assertEqual((self.folder / "tiny.png").read_bytes(), (self.folder / "tiny-there.png").read_bytes())
 
+        # A chart needs the source that the record names.
+        self.assert_fails(5, "chart", "codecs", "tiny", "-o", "chart", says="this test")
+        self.assert_fails(4, "chart", "codecs", "none", "-o", "chart")
         self.assert_fails(5, "material", "import", "BTF", "--on-server", "--name", "x", says="zip")
         next(folder.rglob("*.png")).unlink()
         self.assert_fails(5, "material", "import", "BTF", "--name", "x")

@@ -32,7 +32,7 @@ TEST(SvgPlotTest, NamesAxesPointsAndFront) {
 
 TEST(SvgPlotTest, WhatLiesBeyondIsMarkedAtTheEdge) {
   Plot plot = TwoSeries();
-  plot.y.most = 0.06;
+  plot.y.to = 0.06;
   EXPECT_THAT(SvgOf(plot), HasSubstr("one first: 1 MB, 0.1, on the front, beyond the edge"));
 }
 

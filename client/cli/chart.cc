@@ -1,0 +1,245 @@
+// tessera chart codecs
+#include <algorithm>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <set>
+
+#include <fmt/format.h>
+
+#include "btf/base/atomic_file.h"
+#include "btf/base/status_macros.h"
+#include "btf/chart/codec_chart.h"
+#include "btf/data/half_btf.h"
+#include "btf/data/import.h"
+#include "btf/meso/generated_source.h"
+#include "btf/render/offscreen_context.h"
+#include "client/cli/commands.h"
+#include "client/cli/describe.h"
+#include "client/cli/exit_codes.h"
+#include "client/lib/names.h"
+
+namespace tessera::cli {
+namespace {
+
+struct ChartFlags {
+  std::vector<std::string> sources;
+  std::string folder;
+  std::string layout = "auto";
+  std::string transfer;
+  bool quick = false;
+  bool paper = false;
+  bool paper_largest = false;
+};
+
+// A generated source is traced once; the chart reads it dozens of times.
+absl::StatusOr<std::unique_ptr<BtfSource>> Generated(const GenerateParams& params,
+                                                     const RunContext& context) {
+  TESSERA_ASSIGN_OR_RETURN(const std::unique_ptr<BtfSource> traced, GenerateBtf(params, context));
+  return HalfBtf::CopyOf(*traced, kChartSourceBytes, context);
+}
+
+absl::StatusOr<std::unique_ptr<BtfSource>> Imported(const std::string& path, const ChartFlags& flags,
+                                                    const RunContext& context) {
+  ImportOptions options;
+  TESSERA_ASSIGN_OR_RETURN(options.layout, ParseImportLayout(flags.layout));
+  if (!flags.transfer.empty()) {
+    TESSERA_ASSIGN_OR_RETURN(options.transfer, ParseTransfer(flags.transfer));
+  }
+  // A quarter of it is kept in memory: all that a chart takes.
+  options.memory_budget_bytes = 4 * kChartSourceBytes;
+  return ImportBtf(path, options, context);
+}
+
+// What the catalog's record of a material names, while it is there.
+absl::StatusOr<std::unique_ptr<BtfSource>> SourceOfMaterial(Session& session, const std::string& name,
+                                                            const ChartFlags& flags) {
+  TESSERA_ASSIGN_OR_RETURN(const std::string full_name, FullMaterialName(name));
+  TESSERA_ASSIGN_OR_RETURN(Client * client, session.Connect());
+  const RunContext context = session.Context();
+  TESSERA_ASSIGN_OR_RETURN(const Material material, client->FetchMaterial(full_name, context));
+  const std::string& source = material.provenance.source;
+  if (source.starts_with(kGeneratedPrefix)) {
+    TESSERA_ASSIGN_OR_RETURN(GenerateParams params, ParseGeneratedSource(source));
+    if (params.kind == "heightmap") {
+      return absl::FailedPreconditionError(
+          fmt::format("{} was made from images that its record does not hold: give "
+                      "generated:heightmap,height=FILE,colour=FILE",
+                      full_name));
+    }
+    params.views = material.btfels.views;
+    params.lights = material.btfels.lights;
+    return Generated(params, context);
+  }
+  if (!source.empty() && std::filesystem::exists(source)) {
+    return Imported(source, flags, context);
+  }
+  return absl::FailedPreconditionError(fmt::format(
+      "{}: its source is recorded as \"{}\", which is not at hand here: give the folder or file it was "
+      "imported from",
+      full_name, source));
+}
+
+absl::StatusOr<std::unique_ptr<BtfSource>> OpenSource(Session& session, const std::string& text,
+                                                      const ChartFlags& flags) {
+  if (text.starts_with(kGeneratedPrefix)) {
+    TESSERA_ASSIGN_OR_RETURN(const GenerateParams params, ParseGeneratedSource(text));
+    return Generated(params, session.Context());
+  }
+  if (std::filesystem::exists(text)) {
+    return Imported(text, flags, session.Context());
+  }
+  if (text.find_first_of("/.") != std::string::npos) {
+    return absl::NotFoundError(fmt::format("{}: no such folder or file", text));
+  }
+  return SourceOfMaterial(session, text, flags);
+}
+
+// The last part of a path where that tells it from the others.
+std::string NameOf(const std::string& text, const std::vector<std::string>& all) {
+  const auto last = [](const std::string& t) {
+    return t.starts_with(kGeneratedPrefix) ? t : std::filesystem::path(t).filename().string();
+  };
+  const auto same =
+      std::ranges::count_if(all, [&](const std::string& other) { return last(other) == last(text); });
+  return same == 1 && !last(text).empty() ? last(text) : text;
+}
+
+std::string Rmse(const std::optional<SplitFigures>& figures) {
+  return figures ? fmt::format("{:.4f}", figures->back().squares.rmse()) : "";
+}
+
+std::string SummaryOf(const SourceChart& chart) {
+  std::vector<std::vector<std::string>> table = {{"METHOD", "SETTING", "MB", "ENCODE s", "STREAM ns", "GL ms",
+                                                  "RMSE", "LIGHTS", "VIEWS", "DSSIM", "FLIP"}};
+  for (const ChartPoint& point : chart.points) {
+    if (!point.splits[0]) {
+      table.push_back({point.method, point.setting, "refused", "", "", "", "", "", "", "", point.refusal});
+      continue;
+    }
+    const LimitFigures& all = point.splits[0]->back();
+    table.push_back(
+        {point.method, point.setting, fmt::format("{:.3f}", 1e-6 * static_cast<double>(point.size_bytes)),
+         fmt::format("{:.2f}", point.encode_s), fmt::format("{:.1f}", 1e9 * point.cpu.streaming_s),
+         point.gl ? fmt::format("{:.0f}", 1e3 * point.gl->bilinear_s) : "", Rmse(point.splits[0]),
+         Rmse(point.splits[1]), Rmse(point.splits[2]), fmt::format("{:.4f}", all.dssim),
+         fmt::format("{:.4f}", all.flip)});
+  }
+  return fmt::format("{}\n{}", chart.name, TextTable(table));
+}
+
+std::string SummaryOf(const std::vector<PaperRow>& rows) {
+  std::vector<std::vector<std::string>> table = {
+      {"TEXELS", "KV", "KL", "METHOD", "SECONDS", "FASTER", "RATE %", "RELATIVE RMSE"}};
+  for (const PaperRow& row : rows) {
+    const std::vector<std::string> start = {fmt::format("{0}x{0}", row.side), fmt::format("{}", row.kv),
+                                            fmt::format("{}", row.kl)};
+    const auto add = [&](std::vector<std::string> rest) {
+      rest.insert(rest.begin(), start.begin(), start.end());
+      table.push_back(std::move(rest));
+    };
+    add({"paper", fmt::format("{:.0f}", row.paper_s), "", fmt::format("{:.2f}", 100.0 * row.paper_rate), ""});
+    for (const PaperRun& run : row.runs) {
+      add({run.method, fmt::format("{:.2f}", run.encode_s), fmt::format("{:.0f}", row.paper_s / run.encode_s),
+           fmt::format("{:.2f}",
+                       100.0 * static_cast<double>(run.size_bytes) / static_cast<double>(row.RawBytes())),
+           fmt::format("{:.4f}", run.relative_rmse)});
+    }
+    if (row.runs.empty()) {
+      add({"ours", "not run: --paper-largest", "", "", ""});
+    }
+  }
+  return TextTable(table);
+}
+
+absl::Status RunChart(Session& session, const ChartFlags& flags) {
+  const bool has_paper = flags.paper || flags.paper_largest;
+  if (flags.sources.empty() && !has_paper) {
+    return UsageError("chart codecs: no SOURCE, and neither --paper nor --paper-largest");
+  }
+  const std::set<std::string> different(flags.sources.begin(), flags.sources.end());
+  if (different.size() != flags.sources.size()) {
+    return UsageError("chart codecs: a SOURCE is given twice");
+  }
+  std::error_code error;
+  std::filesystem::create_directories(flags.folder, error);
+  if (error) {
+    return absl::InvalidArgumentError(fmt::format("{}: {}", flags.folder, error.message()));
+  }
+  const std::string csv_path = (std::filesystem::path(flags.folder) / "codecs.csv").string();
+  const std::string html_path = (std::filesystem::path(flags.folder) / "codecs.html").string();
+  const std::string paper_path = (std::filesystem::path(flags.folder) / "paper.csv").string();
+  // A folder that takes no file shows now, not in ten minutes.
+  TESSERA_RETURN_IF_ERROR(AtomicFile::Create(html_path).status());
+
+  std::vector<SourceChart> charts;
+  std::vector<std::string> summaries;
+  std::unique_ptr<OffscreenContext> gl;
+  if (!flags.sources.empty()) {
+    TESSERA_ASSIGN_OR_RETURN(gl, CreateOsmesaContext());
+  }
+  for (const std::string& text : flags.sources) {
+    TESSERA_ASSIGN_OR_RETURN(const std::unique_ptr<BtfSource> source, OpenSource(session, text, flags));
+    TESSERA_ASSIGN_OR_RETURN(
+        SourceChart chart,
+        ChartCodecs(NameOf(text, flags.sources), *source, flags.quick ? ChartSize::kQuick : ChartSize::kFull,
+                    *gl, session.Context()));
+    summaries.push_back(SummaryOf(chart));
+    charts.push_back(std::move(chart));
+  }
+  std::vector<PaperRow> paper;
+  if (has_paper) {
+    TESSERA_ASSIGN_OR_RETURN(
+        paper,
+        RunPaperTable(flags.paper_largest ? PaperSize::kAll : PaperSize::kWithoutLargest, session.Context()));
+    summaries.push_back(SummaryOf(paper));
+  }
+  TESSERA_ASSIGN_OR_RETURN(const std::string html, CodecsHtml(charts, paper));
+  std::vector<std::string> files = {html_path};
+  TESSERA_RETURN_IF_ERROR(WriteFileAtomically(html_path, html));
+  if (!charts.empty()) {
+    TESSERA_RETURN_IF_ERROR(WriteFileAtomically(csv_path, CodecsCsv(charts)));
+    files.push_back(csv_path);
+  }
+  if (has_paper) {
+    TESSERA_RETURN_IF_ERROR(WriteFileAtomically(paper_path, PaperCsv(paper)));
+    files.push_back(paper_path);
+  }
+  const std::vector<StageTime> stages = session.FinishStages();
+  Json described = Json::array();
+  for (const SourceChart& chart : charts) {
+    described.push_back({{"name", chart.name}, {"settings", chart.points.size()}});
+  }
+  session.Answer({{"sources", described}, {"files", files}, {"stages", Session::JsonOfStages(stages)}},
+                 fmt::format("{}\n{}", fmt::join(summaries, "\n\n"), fmt::join(files, "\n")));
+  return absl::OkStatus();
+}
+
+}  // namespace
+
+void AddChartCommand(CLI::App& app, Session& session) {
+  CLI::App* noun = app.add_subcommand("chart", "Methods against each other, as CSV and as a page");
+  noun->require_subcommand(1);
+  const auto flags = std::make_shared<ChartFlags>();
+  CLI::App* command = noun->add_subcommand(
+      "codecs", "Bytes, time and error of every codec and setting, and of JPEG files; minutes a source");
+  command->add_option(
+      "SOURCE", flags->sources,
+      "Folder or file as for material import, generated:KIND[,key=value..] (size, seed, views, lights, "
+      "..), or a material whose recorded source is at hand");
+  command->add_option("-o,--output", flags->folder, "Folder for codecs.html, codecs.csv, paper.csv")
+      ->required();
+  command->add_flag("--quick", flags->quick, "Few settings, on the middle 64x64 texels: under a minute");
+  command->add_flag("--paper", flags->paper,
+                    "Table II of Leung et al. 2007, ours beside it, up to 256x256 texels");
+  command->add_flag("--paper-largest", flags->paper_largest, "The same with its 800x800 rows: half an hour");
+  command->add_option("--layout", flags->layout, "How the images of folders and files are laid out")
+      ->check(CLI::IsMember({"auto", "ubo2003", "manifest", "exr"}))
+      ->capture_default_str();
+  command->add_option("--transfer", flags->transfer,
+                      "Their transfer curve: srgb, linear or gamma:G [by file type]");
+  command->callback(
+      [&session, flags] { session.run = [&session, flags] { return RunChart(session, *flags); }; });
+}
+
+}  // namespace tessera::cli
