@@ -24,7 +24,7 @@ namespace tessera {
 namespace {
 
 constexpr int kMeasuredRows = 32;  // at most about as many rows of texels are compared for all pairs
-constexpr int kPicturesPerClass = 32;
+constexpr int kPicturesPerClass = 16;
 constexpr int kQuickMeasuredRows = 8;
 constexpr int kQuickPicturesPerClass = 8;
 constexpr int kCropSide = 128;

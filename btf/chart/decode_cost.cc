@@ -33,26 +33,33 @@ absl::StatusOr<double> LeastThreadSeconds(const std::function<void(int round)>& 
   return least;
 }
 
-// One tile that is the whole material, laid n x n times over a plane of [-1, 1]^2.
+// One tile that is the whole material, a small one several times, laid repeats x repeats times over a plane
+// of [-1, 1]^2.
 struct PlaneOfTexels {
   TileSet tile_set;
   Dressing dressing;
+  int repeats = 0;
 };
 
-PlaneOfTexels MakePlane(const Material& material, int repeats) {
+PlaneOfTexels MakePlane(const Material& material) {
   constexpr char kName[] = "chart";
+  constexpr int kLeastTile = 64;  // so that a small texture does not take many faces
   const int w = std::min(material.width, material.height);
   PlaneOfTexels plane;
   TileSet& tile_set = plane.tile_set;
   tile_set.arrangement_id = kName;
-  tile_set.tile_size = w;
+  tile_set.tile_size = w * ((kLeastTile + w - 1) / w);
   tile_set.tile_codes = {0};
   tile_set.btfels = material.btfels;
-  for (int y = 0; y < w; ++y) {
-    for (int x = 0; x < w; ++x) {
-      tile_set.tile_index.push_back(PackTexel(static_cast<uint32_t>(y * material.width + x), 0));
+  for (int y = 0; y < tile_set.tile_size; ++y) {
+    for (int x = 0; x < tile_set.tile_size; ++x) {
+      tile_set.tile_index.push_back(PackTexel(static_cast<uint32_t>(y % w * material.width + x % w), 0));
     }
   }
+  // One more than fills the frame.
+  const int repeats =
+      static_cast<int>(std::ceil(kFrameWidth * kFrameTexelsPerPixel / tile_set.tile_size)) + 1;
+  plane.repeats = repeats;
   Dressing& dressing = plane.dressing;
   dressing.arrangement_id = kName;
   const auto place = [&](int i) { return 2.0F * static_cast<float>(i) / static_cast<float>(repeats) - 1.0F; };
@@ -148,14 +155,12 @@ absl::StatusOr<GlFrameCost> MeasureGlFrame(OffscreenContext& context, const Mate
                                            const RunContext& run_context) {
   RunContext quiet = run_context;
   quiet.progress = nullptr;
-  const int w = std::min(material.width, material.height);
-  // One more than fills the frame.
-  const int repeats = static_cast<int>(std::ceil(kFrameWidth * kFrameTexelsPerPixel / w)) + 1;
-  const PlaneOfTexels plane = MakePlane(material, repeats);
+  const PlaneOfTexels plane = MakePlane(material);
   PreviewScene scene{.dressing = &plane.dressing, .tile_set = &plane.tile_set};
   scene.width = kFrameWidth;
   scene.height = kFrameHeight;
-  const double unit_per_pixel = kFrameTexelsPerPixel * 2.0 / (static_cast<double>(repeats) * w);
+  const double unit_per_pixel =
+      kFrameTexelsPerPixel * 2.0 / (static_cast<double>(plane.repeats) * plane.tile_set.tile_size);
   scene.camera.eye = {0.0, 0.0, 0.5 * unit_per_pixel * kFrameHeight / std::tan(0.5 * scene.camera.fov_y_rad)};
   const std::vector<Light> lit = scene.lights;
   scene.lights[0].place = {0.0, 0.0, -1.0};

@@ -248,6 +248,9 @@ texel decodes one file. It has no images at held-out directions: the nearest mea
 taken out of its bytes.</li>
 </ul>
 )";
+  if (charts.empty()) {
+    return html;
+  }
   html +=
       "<table><thead><tr><th>source</th><th class=\"figure\">every n-th row</th><th "
       "class=\"figure\">pictures a "

@@ -35,6 +35,10 @@ TEST(DecodeCostTest, AFrameIsCoveredWhateverTheSizeOfTheTexture) {
   EXPECT_GT(cost->rest_s, 0.0);
   EXPECT_GT(cost->bilinear_s, cost->rest_s);
   EXPECT_GT(cost->bilinear_s, cost->nearest_s);
+  NoiseBtf one(1, 1, *DirectionSet("1x3"), *DirectionSet("1x3"));
+  const auto texel = FindCodec("dsh")->Encode(one, {.kl = 1, .kv = 1}, {});
+  ASSERT_TRUE(texel.ok());
+  EXPECT_TRUE(MeasureGlFrame(**context, *texel, {}).ok());
 }
 
 TEST(DecodeCostTest, StopsWhenAsked) {
