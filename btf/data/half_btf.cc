@@ -30,9 +30,37 @@ absl::StatusOr<std::unique_ptr<HalfBtf>> HalfBtf::CopyOf(BtfSource& source, uint
                                                      SizeBytes(source), " bytes, at most ", limit_bytes));
   }
   std::unique_ptr<HalfBtf> copy(new HalfBtf(source.info()));
+  copy->memory_.resize(source.SamplesPerRow() * source.info().height);
+  copy->samples_ = copy->memory_;
+  TESSERA_RETURN_IF_ERROR(copy->Fill(source, context));
+  return copy;
+}
+
+absl::StatusOr<std::unique_ptr<HalfBtf>> HalfBtf::SpillingCopyOf(BtfSource& source,
+                                                                 uint64_t memory_limit_bytes,
+                                                                 const std::filesystem::path& spill_folder,
+                                                                 const RunContext& context) {
+  const uint64_t size_bytes = SizeBytes(source);
+  if (size_bytes <= memory_limit_bytes) {
+    return CopyOf(source, memory_limit_bytes, context);
+  }
+  std::unique_ptr<HalfBtf> copy(new HalfBtf(source.info()));
+  TESSERA_ASSIGN_OR_RETURN(copy->file_, SpillFile::Create(spill_folder, size_bytes));
+  TESSERA_ASSIGN_OR_RETURN(const std::span<std::byte> bytes, copy->file_->Map());
+  copy->samples_ = {reinterpret_cast<Eigen::half*>(bytes.data()), size_bytes / sizeof(Eigen::half)};
+  TESSERA_RETURN_IF_ERROR(copy->Fill(source, context));
+  return copy;
+}
+
+void HalfBtf::DropPages() const {
+  if (file_) {
+    file_->DropPages();
+  }
+}
+
+absl::Status HalfBtf::Fill(BtfSource& source, const RunContext& context) {
   const size_t row_samples = source.SamplesPerRow();
   const int height = source.info().height;
-  copy->samples_.resize(row_samples * height);
   const int block_rows =
       static_cast<int>(std::clamp<uint64_t>(kBlockBytes / (row_samples * sizeof(float)), 1, height));
   std::vector<float> block(block_rows * row_samples);
@@ -43,17 +71,18 @@ absl::StatusOr<std::unique_ptr<HalfBtf>> HalfBtf::CopyOf(BtfSource& source, uint
     const int rows = std::min(block_rows, height - y);
     const std::span<float> samples = std::span(block).first(rows * row_samples);
     TESSERA_RETURN_IF_ERROR(source.ReadRows(y, rows, samples, silent));
-    Eigen::half* to = copy->samples_.data() + static_cast<size_t>(y) * row_samples;
+    Eigen::half* to = samples_.data() + static_cast<size_t>(y) * row_samples;
     ParallelFor(context, 0, static_cast<int64_t>(samples.size()), kSamplesPerTask,
                 [&](int64_t begin, int64_t end) {
                   for (int64_t i = begin; i < end; ++i) {
                     to[i] = static_cast<Eigen::half>(std::clamp(samples[i], -kMaxHalf, kMaxHalf));
                   }
                 });
+    DropPages();
     TESSERA_RETURN_IF_ERROR(context.CheckStop());
   }
   context.Report("read", height, height, "rows");
-  return copy;
+  return absl::OkStatus();
 }
 
 absl::Status HalfBtf::ReadRows(int row_begin, int num_rows, std::span<float> samples,
@@ -65,6 +94,7 @@ absl::Status HalfBtf::ReadRows(int row_begin, int num_rows, std::span<float> sam
                 Eigen::Map<Floats>(samples.data() + begin, end - begin) =
                     Eigen::Map<const Halves>(from + begin, end - begin).cast<float>();
               });
+  DropPages();
   return context.CheckStop();
 }
 

@@ -57,6 +57,13 @@ std::string TextOf(const Json& value) {
   return value.is_null() ? "" : value.dump();
 }
 
+// What was written for people, a line each.
+bool IsListOfSentences(const Json& value) {
+  return value.is_array() && std::ranges::all_of(value, [](const Json& element) {
+           return element.is_string() && element.get_ref<const std::string&>().find(' ') != std::string::npos;
+         });
+}
+
 void AppendRecord(const Json& object, const std::string& prefix,
                   std::vector<std::pair<std::string, std::string>>& lines) {
   for (const auto& [key, value] : object.items()) {
@@ -66,6 +73,10 @@ void AppendRecord(const Json& object, const std::string& prefix,
     } else if (value.is_array() && !value.empty() && value.front().is_object()) {
       for (size_t i = 0; i < value.size(); ++i) {
         lines.emplace_back(fmt::format("{}.{}", name, i), value[i].dump());
+      }
+    } else if (IsListOfSentences(value)) {
+      for (const Json& sentence : value) {
+        lines.emplace_back(name, sentence.get<std::string>());
       }
     } else if (std::string text = TextOf(value); !text.empty()) {
       lines.emplace_back(name, std::move(text));

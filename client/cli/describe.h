@@ -25,7 +25,8 @@ namespace tessera::cli {
 
 // Rows of equal length, the first of them headings, in columns; no trailing line break.
 [[nodiscard]] std::string TextTable(const std::vector<std::vector<std::string>>& rows);
-// "key: value" lines of a JSON object, nested keys with dots, empty values left out.
+// "key: value" lines of a JSON object, nested keys with dots, empty values left out. Lists of sentences and
+// of objects have a line for each, other long lists are counted.
 [[nodiscard]] std::string TextRecord(const Json& object);
 
 }  // namespace tessera::cli

@@ -7,8 +7,7 @@
 
 #include "btf/base/atomic_file.h"
 #include "btf/base/status_macros.h"
-#include "btf/codec/codec.h"
-#include "btf/codec/diagnosis.h"
+#include "btf/choice/encode_model.h"
 #include "btf/data/import.h"
 #include "btf/image/image_io.h"
 #include "client/cli/arguments.h"
@@ -17,6 +16,7 @@
 #include "client/cli/exit_codes.h"
 #include "client/lib/flat_decode.h"
 #include "client/lib/names.h"
+#include "proto/wire/convert.h"
 #include "proto/wire/status.h"
 
 namespace tessera::cli {
@@ -30,10 +30,17 @@ struct CodecFlags {
   uint32_t kv = 25;
   uint32_t eigen_textures = 5;
   std::string cls_energy = "hemisphere";
+  uint32_t rank = 0;
+  double max_error = 0.0;
+  uint64_t max_bytes = 0;
+  std::string scene_light;
 };
 
 void AddCodecFlags(CLI::App* command, CodecFlags& flags) {
-  command->add_option("--codec", flags.codec, fmt::format("Codec id: {}", fmt::join(CodecIds(), ", ")))
+  command
+      ->add_option("--codec", flags.codec,
+                   fmt::format("Codec id: {}; or {}: the smallest model that meets a bound",
+                               fmt::join(CodecIds(), ", "), kAutoCodec))
       ->capture_default_str();
   command->add_option("--kl", flags.kl, "dsh*: light coefficients, 1, 4, 9, 16, 25, 36 or 49")
       ->capture_default_str();
@@ -46,6 +53,30 @@ void AddCodecFlags(CLI::App* command, CodecFlags& flags) {
   command->add_option("--cls-energy", flags.cls_energy, "dsh-cls: energy bound")
       ->check(CLI::IsMember({"hemisphere", "sphere"}))
       ->capture_default_str();
+  // Bounds of which a codec takes one.
+  CLI::Option* rank =
+      command
+          ->add_option("--rank", flags.rank, fmt::format("dfmf: coefficients a texel [{}]", kDefaultDfmfRank))
+          ->check(CLI::PositiveNumber);
+  CLI::Option* max_error =
+      command
+          ->add_option("--max-error", flags.max_error,
+                       "dfmf, auto: bound on the root mean square error of linear RGB, absolute; dfmf: over "
+                       "the samples; auto: on held-out lights and on held-out views")
+          ->check(CLI::PositiveNumber);
+  CLI::Option* max_bytes =
+      command
+          ->add_option("--max-bytes", flags.max_bytes,
+                       "dfmf, auto: bound on the container, in bytes or with a unit: 400KB, 2MiB")
+          ->transform(CLI::AsSizeValue(/*kb_is_1000=*/true))
+          ->check(CLI::PositiveNumber);
+  rank->excludes(max_error)->excludes(max_bytes);
+  max_error->excludes(max_bytes);
+  command
+      ->add_option("--for", flags.scene_light,
+                   "auto: light of the scene; environment: models that project on spherical harmonics first "
+                   "[point]")
+      ->check(CLI::IsMember({"point", "environment"}));
 }
 
 v1::EncodeOptions MessageOf(const CodecFlags& flags) {
@@ -55,6 +86,10 @@ v1::EncodeOptions MessageOf(const CodecFlags& flags) {
   message.set_kv(flags.kv);
   message.set_eigen_textures(flags.eigen_textures);
   message.set_cls_energy(flags.cls_energy);
+  message.set_rank(flags.rank);
+  message.set_max_error(flags.max_error);
+  message.set_max_bytes(flags.max_bytes);
+  message.set_scene_light(flags.scene_light);
   return message;
 }
 
@@ -110,10 +145,19 @@ void AnswerMade(Session& session, const v1::Material& material, std::string_view
   text += fmt::format("\n{:<12} {:8.2f} s, at most {} of memory here", "in all", total,
                       FormatAmount(static_cast<double>(usage.ru_maxrss * kBytesPerUnit), "bytes"));
   session.Answer(value, text);
-  const Json::json_pointer place("/metadata/diagnosis/warnings");
-  for (const Json& warning : described.value(place, Json::array())) {
-    session.Warn(fmt::format("{}: {}", ShortName(material.name()),
-                             warning.is_string() ? warning.get<std::string>() : warning.dump()));
+  const auto lines_at = [&](const char* place) {
+    std::vector<std::string> lines;
+    for (const Json& line : described.value(Json::json_pointer(place), Json::array())) {
+      lines.push_back(fmt::format("{}: {}", ShortName(material.name()),
+                                  line.is_string() ? line.get<std::string>() : line.dump()));
+    }
+    return lines;
+  };
+  for (const std::string& line : lines_at("/metadata/choice/report")) {
+    session.Note(line);
+  }
+  for (const std::string& line : lines_at("/metadata/diagnosis/warnings")) {
+    session.Warn(line);
   }
 }
 
@@ -136,23 +180,14 @@ absl::Status ImportHere(Session& session, Client& client, const ImportFlags& fla
   options.memory_budget_bytes = flags.memory_budget_mib * kMiB;
   options.spill_folder = flags.spill_folder;
   options.provenance = flags.provenance;
-  const Codec* codec = FindCodec(flags.codec.codec);
-  if (codec == nullptr) {
-    return absl::InvalidArgumentError(
-        fmt::format("codec \"{}\": expected one of {}", flags.codec.codec, fmt::join(CodecIds(), ", ")));
-  }
-  const EncodeParams params{
-      .kl = static_cast<int>(flags.codec.kl),
-      .kv = static_cast<int>(flags.codec.kv),
-      .cls_energy = flags.codec.cls_energy == "sphere" ? ClsEnergy::kSphere : ClsEnergy::kHemisphere,
-      .eigen_textures = static_cast<int>(flags.codec.eigen_textures),
-      .memory_budget_bytes = options.memory_budget_bytes,
-      .spill_folder = options.spill_folder};
+  TESSERA_ASSIGN_OR_RETURN(ModelRequest model, ModelRequestFromMessage(MessageOf(flags.codec)));
+  TESSERA_RETURN_IF_ERROR(CheckModelRequest(model));
+  model.params.memory_budget_bytes = options.memory_budget_bytes;
+  model.params.spill_folder = options.spill_folder;
   TESSERA_RETURN_IF_ERROR(CheckNameIsFree(client, name, flags.replace, context));
 
   TESSERA_ASSIGN_OR_RETURN(std::unique_ptr<BtfSource> source, ImportBtf(flags.path, options, context));
-  TESSERA_ASSIGN_OR_RETURN(Material material, codec->Encode(*source, params, context));
-  TESSERA_RETURN_IF_ERROR(RecordDiagnosis(*source, context, material));
+  TESSERA_ASSIGN_OR_RETURN(const Material material, EncodeModel(*source, model, context));
   source.reset();
   TESSERA_ASSIGN_OR_RETURN(const ContainerFile file, MaterialFile(material));
   TESSERA_ASSIGN_OR_RETURN(const v1::Blob blob, client.UploadContainer(file, context));

@@ -109,31 +109,48 @@ void FillDefaults(v1::EncodeOptions& message) {
   if (message.cls_energy().empty()) {
     message.set_cls_energy("hemisphere");
   }
+  if (message.codec() == "dfmf" && message.rank() == 0 && message.max_error() == 0.0 &&
+      message.max_bytes() == 0) {
+    message.set_rank(kDefaultDfmfRank);
+  }
+  if (message.codec() == kAutoCodec && message.scene_light().empty()) {
+    message.set_scene_light("point");
+  }
 }
 
-absl::StatusOr<EncodeParams> EncodeParamsFromMessage(const v1::EncodeOptions& message) {
+absl::StatusOr<ModelRequest> ModelRequestFromMessage(const v1::EncodeOptions& message) {
   constexpr uint32_t kMaxCoefficients = 1u << 16;  // keeps the casts exact; the codec knows the real limit
   v1::EncodeOptions filled = message;
   FillDefaults(filled);
-  if (filled.kl() > kMaxCoefficients || filled.kv() > kMaxCoefficients) {
-    return absl::InvalidArgumentError(
-        absl::StrCat("kl ", filled.kl(), ", kv ", filled.kv(), ": at most ", kMaxCoefficients));
+  for (const auto& [name, value] :
+       {std::pair("kl", filled.kl()), std::pair("kv", filled.kv()),
+        std::pair("eigen_textures", filled.eigen_textures()), std::pair("rank", filled.rank())}) {
+    if (value > kMaxCoefficients) {
+      return absl::InvalidArgumentError(absl::StrCat(name, " = ", value, ": at most ", kMaxCoefficients));
+    }
   }
-  if (filled.eigen_textures() > kMaxCoefficients) {
-    return absl::InvalidArgumentError(
-        absl::StrCat("eigen_textures ", filled.eigen_textures(), ": at most ", kMaxCoefficients));
-  }
-  EncodeParams params;
+  ModelRequest request{.codec = filled.codec()};
+  EncodeParams& params = request.params;
   params.kl = static_cast<int>(filled.kl());
   params.kv = static_cast<int>(filled.kv());
   params.eigen_textures = static_cast<int>(filled.eigen_textures());
+  params.rank = static_cast<int>(filled.rank());
+  params.max_error = filled.max_error();
+  params.max_bytes = filled.max_bytes();
   if (filled.cls_energy() == "sphere") {
     params.cls_energy = ClsEnergy::kSphere;
   } else if (filled.cls_energy() != "hemisphere") {
     return absl::InvalidArgumentError(
         absl::StrCat("cls_energy \"", filled.cls_energy(), "\", expected hemisphere or sphere"));
   }
-  return params;
+  if (!filled.scene_light().empty()) {
+    request.scene_light = FindSceneLight(filled.scene_light());
+    if (!request.scene_light) {
+      return absl::InvalidArgumentError(
+          absl::StrCat("scene_light \"", filled.scene_light(), "\", expected point or environment"));
+    }
+  }
+  return request;
 }
 
 Light LightFromMessage(const v1::Light& message) {

@@ -6,7 +6,7 @@
 #include <absl/status/statusor.h>
 
 #include "btf/base/run_context.h"
-#include "btf/codec/codec.h"
+#include "btf/choice/encode_model.h"
 #include "btf/data/btf_source.h"
 #include "btf/math/conventions.h"
 #include "btf/render/preview.h"
@@ -31,9 +31,10 @@ namespace tessera {
 [[nodiscard]] v1::Material MessageFromMaterial(const Material& material);
 [[nodiscard]] v1::TileSet MessageFromTileSet(const TileSet& tile_set);
 
-// An encoder's parameters with defaults for what is 0 or empty. The codec itself checks kl and kv.
-// Errors: INVALID_ARGUMENT naming cls_energy and its legal values.
-[[nodiscard]] absl::StatusOr<EncodeParams> EncodeParamsFromMessage(const v1::EncodeOptions& message);
+// With defaults for what is 0 or empty. What the codec then is and takes, CheckModelRequest and the codec
+// know. Errors: INVALID_ARGUMENT naming cls_energy or scene_light and its legal values, or a number out of
+// all range.
+[[nodiscard]] absl::StatusOr<ModelRequest> ModelRequestFromMessage(const v1::EncodeOptions& message);
 // Defaults for what is 0 or empty, so that equal requests become equal bytes.
 void FillDefaults(v1::EncodeOptions& message);
 

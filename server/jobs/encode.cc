@@ -1,48 +1,35 @@
 #include "server/jobs/encode.h"
 
-#include <absl/strings/str_cat.h>
+#include <absl/strings/str_replace.h>
 
 #include "btf/base/status_macros.h"
-#include "btf/codec/codec.h"
-#include "btf/codec/diagnosis.h"
+#include "btf/choice/encode_model.h"
 #include "proto/wire/convert.h"
-#include "proto/wire/status.h"
 
 namespace tessera {
-namespace {
-
-absl::StatusOr<const Codec*> CodecOf(const v1::EncodeOptions& filled) {
-  const Codec* codec = FindCodec(filled.codec());
-  if (codec == nullptr) {
-    std::string known;
-    for (const std::string_view id : CodecIds()) {
-      known.append(known.empty() ? "" : ", ").append(id);
-    }
-    return WithReason(
-        absl::InvalidArgumentError(absl::StrCat("unknown codec \"", filled.codec(), "\", known: ", known)),
-        "ARGUMENT_INVALID", "encode.codec");
-  }
-  return codec;
-}
-
-}  // namespace
 
 absl::Status CheckEncodeOptions(const v1::EncodeOptions& options) {
-  v1::EncodeOptions filled = options;
-  FillDefaults(filled);
-  TESSERA_RETURN_IF_ERROR(CodecOf(filled).status());
-  return EncodeParamsFromMessage(filled).status();
+  TESSERA_ASSIGN_OR_RETURN(const ModelRequest request, ModelRequestFromMessage(options));
+  return CheckModelRequest(request);
 }
 
 absl::StatusOr<Material> EncodeSource(BtfSource& source, const v1::EncodeOptions& options,
+                                      const std::filesystem::path& scratch_folder,
                                       const RunContext& context) {
-  v1::EncodeOptions filled = options;
-  FillDefaults(filled);
-  TESSERA_ASSIGN_OR_RETURN(const Codec* codec, CodecOf(filled));
-  TESSERA_ASSIGN_OR_RETURN(const EncodeParams params, EncodeParamsFromMessage(filled));
-  TESSERA_ASSIGN_OR_RETURN(Material material, codec->Encode(source, params, context));
-  TESSERA_RETURN_IF_ERROR(RecordDiagnosis(source, context, material));
-  return material;
+  TESSERA_ASSIGN_OR_RETURN(ModelRequest request, ModelRequestFromMessage(options));
+  request.params.spill_folder = scratch_folder;
+  return EncodeModel(source, request, context);
+}
+
+absl::Status WithoutFolder(const absl::Status& status, const std::filesystem::path& folder) {
+  if (status.ok()) {
+    return status;
+  }
+  absl::Status result(status.code(), absl::StrReplaceAll(status.message(), {{folder.string() + "/", ""},
+                                                                            {folder.string(), "scratch"}}));
+  status.ForEachPayload(
+      [&result](absl::string_view url, const absl::Cord& payload) { result.SetPayload(url, payload); });
+  return result;
 }
 
 absl::StatusOr<JobOutput> OutputOfMaterial(const Material& material) {

@@ -7,7 +7,9 @@
 #include <absl/strings/str_cat.h>
 
 #include "btf/base/status_macros.h"
+#include "btf/choice/encode_model.h"
 #include "btf/data/direction_sets.h"
+#include "btf/data/half_btf.h"
 #include "btf/image/image_io.h"
 #include "btf/meso/generate.h"
 #include "proto/wire/convert.h"
@@ -33,6 +35,34 @@ absl::StatusOr<GenerateParams> ParamsFromRequest(const v1::GenerateMaterialReque
   TESSERA_ASSIGN_OR_RETURN(params.lights, DirectionSet(request.lights()));
   TESSERA_ASSIGN_OR_RETURN(params.views, DirectionSet(request.views()));
   return params;
+}
+
+// `request` with its defaults filled in.
+absl::StatusOr<Material> GenerateAndEncode(const v1::GenerateMaterialRequest& request,
+                                           const JobContext& context) {
+  TESSERA_ASSIGN_OR_RETURN(GenerateParams params, ParamsFromRequest(request));
+  const auto read_image = [&](const std::string& sha256, std::string_view name,
+                              const std::optional<Transfer>& transfer,
+                              std::optional<Image>& image) -> absl::Status {
+    if (sha256.empty()) {
+      return absl::OkStatus();
+    }
+    TESSERA_ASSIGN_OR_RETURN(const std::string bytes, context.blobs->ReadAll(sha256, kMaxImageBytes));
+    TESSERA_ASSIGN_OR_RETURN(image, DecodeImage(std::as_bytes(std::span(bytes)), name, transfer));
+    return absl::OkStatus();
+  };
+  // Height and roughness are measures, not colours: their codes are taken as they are.
+  TESSERA_RETURN_IF_ERROR(read_image(request.height_sha256(), "height", Transfer::Linear(), params.height));
+  TESSERA_RETURN_IF_ERROR(read_image(request.colour_sha256(), "colour", std::nullopt, params.colour));
+  TESSERA_RETURN_IF_ERROR(
+      read_image(request.roughness_sha256(), "roughness", Transfer::Linear(), params.roughness));
+  TESSERA_ASSIGN_OR_RETURN(std::unique_ptr<BtfSource> source, GenerateBtf(params, context.run));
+  if (request.encode().codec() == kAutoCodec) {
+    // A choice reads the source dozens of times, and every reading would trace it again.
+    TESSERA_ASSIGN_OR_RETURN(source, HalfBtf::SpillingCopyOf(*source, EncodeParams{}.memory_budget_bytes / 4,
+                                                             context.scratch_folder, context.run));
+  }
+  return EncodeSource(*source, request.encode(), context.scratch_folder, context.run);
 }
 
 }  // namespace
@@ -87,25 +117,11 @@ absl::StatusOr<JobOutput> RunGenerateJob(const JobInput& input, const JobContext
     return absl::InternalError("a generate job takes a GenerateMaterialRequest");
   }
   FillDefaults(request);
-  TESSERA_ASSIGN_OR_RETURN(GenerateParams params, ParamsFromRequest(request));
-  const auto read_image = [&](const std::string& sha256, std::string_view name,
-                              const std::optional<Transfer>& transfer,
-                              std::optional<Image>& image) -> absl::Status {
-    if (sha256.empty()) {
-      return absl::OkStatus();
-    }
-    TESSERA_ASSIGN_OR_RETURN(const std::string bytes, context.blobs->ReadAll(sha256, kMaxImageBytes));
-    TESSERA_ASSIGN_OR_RETURN(image, DecodeImage(std::as_bytes(std::span(bytes)), name, transfer));
-    return absl::OkStatus();
-  };
-  // Height and roughness are measures, not colours: their codes are taken as they are.
-  TESSERA_RETURN_IF_ERROR(read_image(request.height_sha256(), "height", Transfer::Linear(), params.height));
-  TESSERA_RETURN_IF_ERROR(read_image(request.colour_sha256(), "colour", std::nullopt, params.colour));
-  TESSERA_RETURN_IF_ERROR(
-      read_image(request.roughness_sha256(), "roughness", Transfer::Linear(), params.roughness));
-  TESSERA_ASSIGN_OR_RETURN(const std::unique_ptr<BtfSource> source, GenerateBtf(params, context.run));
-  TESSERA_ASSIGN_OR_RETURN(const Material material, EncodeSource(*source, request.encode(), context.run));
-  return OutputOfMaterial(material);
+  const absl::StatusOr<Material> material = GenerateAndEncode(request, context);
+  if (!material.ok()) {
+    return WithoutFolder(material.status(), context.scratch_folder);
+  }
+  return OutputOfMaterial(*material);
 }
 
 }  // namespace tessera

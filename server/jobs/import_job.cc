@@ -4,8 +4,6 @@
 #include <fstream>
 #include <memory>
 
-#include <absl/strings/str_replace.h>
-
 #include "btf/base/status_macros.h"
 #include "btf/data/import.h"
 #include "proto/wire/convert.h"
@@ -33,17 +31,6 @@ const char* ExtensionOf(const std::filesystem::path& file) {
   return magic == kExrMagic ? ".exr" : ".zip";
 }
 
-// Messages reach clients: "archive.zip: ..." instead of the folder it lies in.
-absl::Status WithoutFolder(const absl::Status& status, const std::filesystem::path& folder) {
-  if (status.ok()) {
-    return status;
-  }
-  absl::Status result(status.code(), absl::StrReplaceAll(status.message(), {{folder.string() + "/", ""}}));
-  status.ForEachPayload(
-      [&result](absl::string_view url, const absl::Cord& payload) { result.SetPayload(url, payload); });
-  return result;
-}
-
 absl::StatusOr<Material> ImportAndEncode(const v1::ImportMaterialRequest& request,
                                          const std::string& archive_sha256, const JobContext& context) {
   TESSERA_ASSIGN_OR_RETURN(ImportOptions options, OptionsFromRequest(request));
@@ -58,7 +45,7 @@ absl::StatusOr<Material> ImportAndEncode(const v1::ImportMaterialRequest& reques
     return absl::InternalError("cannot prepare the archive: " + error.message());
   }
   TESSERA_ASSIGN_OR_RETURN(const std::unique_ptr<BtfSource> source, ImportBtf(archive, options, context.run));
-  return EncodeSource(*source, request.encode(), context.run);
+  return EncodeSource(*source, request.encode(), context.scratch_folder, context.run);
 }
 
 }  // namespace

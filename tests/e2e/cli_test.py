@@ -16,6 +16,7 @@ from harness import decode_png
 GENERATE = ["--size", 64, "--lights", "4x6", "--views", "4x6", "--kl", 4, "--kv", 4]
 SYNTHESIZE = ["--arrangement", "surface-96", "--tile", 16, "--strip", 8]
 REDRESS_LIMIT_MS = 10
+CHOOSE = ["material", "generate", "weave", "--name", "x", "--size", 32, "--lights", "4x8", "--views", "4x8", "--codec", "auto"]
 
 
 class NoServerTest(harness.unittest.TestCase):
@@ -23,7 +24,7 @@ class NoServerTest(harness.unittest.TestCase):
 
     def tessera(self, *words, timeout=60, **variables):
         environment = {key: value for key, value in os.environ.items() if key != "TESSERA_SERVER"}
-        command = [harness.options.bin / "tessera", *words]
+        command = [harness.options.bin / "tessera", *[str(word) for word in words]]
         return harness.Result(command, subprocess.run(command, env=dict(environment, **variables), text=True,
                                                       capture_output=True, timeout=timeout))
 
@@ -42,7 +43,12 @@ class NoServerTest(harness.unittest.TestCase):
                       ["server", "status", "--server", "nowhere"],
                       ["preview", "surface-96/x", "--mesh", "builtin:torus", "--size", "3x4", "-o", "x.png"],
                       ["preview", "surface-96/x", "--mesh", "builtin:torus", "-o", "x.jpg"],
-                      ["preview", "surface-96/x", "-o", "x.png"]):
+                      ["preview", "surface-96/x", "-o", "x.png"],
+                      [*CHOOSE, "--max-error", 0.1, "--max-bytes", "1MiB"], [*CHOOSE, "--max-error", "-1"],
+                      [*CHOOSE, "--max-error", "little"], [*CHOOSE, "--max-bytes", "1 parsec"],
+                      [*CHOOSE, "--max-error", 0.1, "--for", "discos"],
+                      ["material", "generate", "holes", "--name", "x", "--codec", "dfmf", "--rank", 0],
+                      ["material", "generate", "holes", "--name", "x", "--codec", "dfmf", "--rank", 3, "--max-bytes", 9]):
             result = self.tessera(*words)
             self.assertEqual(result.code, 2, result)
             self.assertEqual(result.out, "", result)
@@ -361,7 +367,51 @@ class MainJobTest(harness.CommandTest):
         self.assertEqual([pull.wait(harness.COMMAND_TIMEOUT_S) for pull in pulls], [0, 0])
         self.assertEqual((self.folder / "pulled-0.tsra").read_bytes(), (self.folder / "pulled-1.tsra").read_bytes())
 
-    def test_k_replace_and_delete(self):
+    def test_k_a_codec_is_chosen_by_a_bound(self):
+        choose = lambda name, *words: [*CHOOSE[:4], name, *CHOOSE[5:], *words]
+        made = self.run_json(*choose("loose", "--max-error", 0.3))["material"]
+        choice = made["metadata"]["choice"]
+        self.assertEqual(choice["chosen"]["codec"], made["codec"])
+        self.assertEqual(choice["chosen"]["bytes"], made["blob"]["size_bytes"])
+        for held_out in ("held_out_lights_rmse", "held_out_views_rmse"):
+            self.assertLessEqual(choice["chosen"][held_out], 0.3)
+        self.assertEqual(choice["goal"], {"max_error": 0.3, "scene_light": "point"})
+        self.assertEqual({r["codec"] for r in choice["rejected"]} | {made["codec"]}, {"dfmf", "dsh", "dsh-cls", "view-pca"})
+
+        text = self.run_ok(*choose("tight", "--max-error", 0.145, "--for", "environment"))
+        self.assertRegex(text.err, r"tight: chose \S+ .* for max_error = 0.145, environment light: .* on held-out lights")
+        self.assertRegex(text.err, r"tight: rejected dsh \d+x\d+: ")
+        shown = self.run_ok("material", "show", "tight").out
+        self.assertRegex(shown, r"(?m)^metadata\.choice\.report: +chose \S+ .* for max_error = 0\.145")
+        self.assertRegex(shown, r"(?m)^metadata\.choice\.report: +rejected ")
+        self.assertLess(made["blob"]["size_bytes"], self.run_json("material", "show", "tight")["blob"]["size_bytes"])
+
+        small = self.run_json(*choose("small", "--max-bytes", "64KiB"))["material"]
+        self.assertLessEqual(small["blob"]["size_bytes"], 64 * 1024)
+        self.assertEqual(small["metadata"]["choice"]["goal"]["max_bytes"], 64 * 1024)
+
+        error = self.assert_fails(6, *choose("never", "--max-error", 0.0001), reason="BOUND_NOT_REACHED", says="the best is")
+        self.assertIn("max_error = 0.0001", error["message"])
+        self.assert_fails(4, "material", "show", "never")
+
+        # Encoded here, and there.
+        here = self.run_json("material", "import", "BTF.zip", "--name", "chosen-here", "--codec", "auto", "--max-error", 0.2)
+        there = self.run_json("material", "import", "BTF.zip", "--on-server", "--name", "chosen-there", "--codec", "auto",
+                              "--max-error", 0.2)
+        self.assertEqual(here["material"]["metadata"], there["material"]["metadata"])
+        self.assert_fails(5, "material", "import", "BTF.zip", "--name", "y", "--codec", "auto", "--max-error", 0.00001,
+                          reason="BOUND_NOT_REACHED")
+        # The bounds of dfmf itself, and codecs that have none.
+        ranked = self.run_json("material", "import", "BTF.zip", "--name", "ranked", "--codec", "dfmf", "--rank", 3)
+        self.assertLessEqual(ranked["material"]["num_coefficients"], 3)
+        bounded = self.run_json("material", "import", "BTF.zip", "--name", "bounded", "--codec", "dfmf", "--max-error", 0.05)
+        self.assertLessEqual(bounded["material"]["metadata"]["encode_rmse"], 0.05)
+        for words, name in ((["--codec", "auto"], "max_error"), (["--codec", "dsh", "--max-error", 0.1], "max_error"),
+                            (["--codec", "auto", "--rank", 3], "rank"), (["--for", "point"], "scene_light")):
+            self.assert_fails(5, "material", "import", "BTF.zip", "--name", "y", *words, reason="ARGUMENT_INVALID", says=name)
+            self.assert_fails(5, *CHOOSE[:-2], *words, reason="ARGUMENT_INVALID", says=name)
+
+    def test_l_replace_and_delete(self):
         before = self.run_json("material", "show", "leopard")["blob"]["sha256"]
         after = self.run_json("material", "generate", "reactdiffuse", "--name", "leopard", "--seed", 4, "--replace", *GENERATE)
         self.assertNotEqual(before, after["material"]["blob"]["sha256"])
@@ -374,7 +424,7 @@ class MainJobTest(harness.CommandTest):
         self.assertEqual(status["num_tile_sets"], len(self.run_json("tileset", "list")["tile_sets"]))
         self.assertRegex(self.run_ok("server", "status").out, re.compile(r"^num_materials: +\d", re.M))
 
-    def test_l_a_stopped_server_is_no_server(self):
+    def test_m_a_stopped_server_is_no_server(self):
         self.assertEqual(self.server.stop(), 0, self.server.log_text())
         self.assert_fails(3, "material", "list", says="tessera-server --data")
 

@@ -29,23 +29,73 @@ TEST(ConvertTest, ArrangementsComeBackAndAreChecked) {
 }
 
 TEST(ConvertTest, EncodeOptionsHaveDefaults) {
-  const auto params = EncodeParamsFromMessage({});
-  ASSERT_TRUE(params.ok());
-  EXPECT_EQ(params->kl, 25);
-  EXPECT_EQ(params->kv, 25);
-  EXPECT_EQ(params->cls_energy, ClsEnergy::kHemisphere);
+  const auto request = ModelRequestFromMessage({});
+  ASSERT_TRUE(request.ok());
+  EXPECT_EQ(request->codec, "dsh-cls");
+  EXPECT_EQ(request->params.kl, 25);
+  EXPECT_EQ(request->params.kv, 25);
+  EXPECT_EQ(request->params.cls_energy, ClsEnergy::kHemisphere);
+  EXPECT_EQ(request->params.rank, 0);
+  EXPECT_FALSE(request->scene_light.has_value());
   v1::EncodeOptions message;
   message.set_cls_energy("cube");
-  EXPECT_EQ(EncodeParamsFromMessage(message).status().code(), absl::StatusCode::kInvalidArgument);
+  EXPECT_EQ(ModelRequestFromMessage(message).status().code(), absl::StatusCode::kInvalidArgument);
   message.set_cls_energy("sphere");
   message.set_kl(16);
-  EXPECT_EQ(EncodeParamsFromMessage(message)->kl, 16);
-  EXPECT_EQ(EncodeParamsFromMessage(message)->cls_energy, ClsEnergy::kSphere);
-  EXPECT_EQ(EncodeParamsFromMessage(message)->eigen_textures, 5);
+  EXPECT_EQ(ModelRequestFromMessage(message)->params.kl, 16);
+  EXPECT_EQ(ModelRequestFromMessage(message)->params.cls_energy, ClsEnergy::kSphere);
+  EXPECT_EQ(ModelRequestFromMessage(message)->params.eigen_textures, 5);
   message.set_eigen_textures(12);
-  EXPECT_EQ(EncodeParamsFromMessage(message)->eigen_textures, 12);
+  EXPECT_EQ(ModelRequestFromMessage(message)->params.eigen_textures, 12);
   message.set_eigen_textures(1u << 31);
-  EXPECT_EQ(EncodeParamsFromMessage(message).status().code(), absl::StatusCode::kInvalidArgument);
+  EXPECT_EQ(ModelRequestFromMessage(message).status().code(), absl::StatusCode::kInvalidArgument);
+}
+
+TEST(ConvertTest, BoundsOfAModelComeThrough) {
+  v1::EncodeOptions message;
+  message.set_codec("dfmf");
+  EXPECT_EQ(ModelRequestFromMessage(message)->params.rank, kDefaultDfmfRank);
+  message.set_rank(24);
+  EXPECT_EQ(ModelRequestFromMessage(message)->params.rank, 24);
+  message.set_rank(1u << 31);
+  EXPECT_EQ(ModelRequestFromMessage(message).status().code(), absl::StatusCode::kInvalidArgument);
+
+  message.Clear();
+  message.set_codec("dfmf");
+  message.set_max_error(0.02);
+  EXPECT_EQ(ModelRequestFromMessage(message)->params.rank, 0);
+  EXPECT_EQ(ModelRequestFromMessage(message)->params.max_error, 0.02);
+
+  message.Clear();
+  message.set_codec("auto");
+  message.set_max_bytes(uint64_t{5} << 32);
+  EXPECT_EQ(ModelRequestFromMessage(message)->codec, kAutoCodec);
+  EXPECT_EQ(ModelRequestFromMessage(message)->params.max_bytes, uint64_t{5} << 32);
+  EXPECT_EQ(ModelRequestFromMessage(message)->scene_light, SceneLight::kPoint);
+  message.set_scene_light("environment");
+  EXPECT_EQ(ModelRequestFromMessage(message)->scene_light, SceneLight::kEnvironment);
+  message.set_scene_light("disco");
+  const absl::Status refused = ModelRequestFromMessage(message).status();
+  EXPECT_EQ(refused.code(), absl::StatusCode::kInvalidArgument);
+  EXPECT_NE(refused.message().find("disco"), absl::string_view::npos);
+}
+
+TEST(ConvertTest, EqualWorkIsEqualBytes) {
+  v1::EncodeOptions said;
+  said.set_codec("auto");
+  said.set_max_error(0.05);
+  v1::EncodeOptions implied = said;
+  said.set_scene_light("point");
+  FillDefaults(said);
+  FillDefaults(implied);
+  EXPECT_EQ(said.SerializeAsString(), implied.SerializeAsString());
+  v1::EncodeOptions ranked;
+  ranked.set_codec("dfmf");
+  v1::EncodeOptions bare = ranked;
+  ranked.set_rank(kDefaultDfmfRank);
+  FillDefaults(ranked);
+  FillDefaults(bare);
+  EXPECT_EQ(ranked.SerializeAsString(), bare.SerializeAsString());
 }
 
 TEST(ConvertTest, LightsAndCamerasComeBack) {

@@ -8,6 +8,7 @@
 #include "btf/data/half_btf.h"
 #include "tests/support/btf_files.h"
 #include "tests/support/read_btf.h"
+#include "tests/support/temp_folder.h"
 
 namespace tessera {
 namespace {
@@ -81,6 +82,21 @@ TEST(HalfBtfTest, RoundsToElevenBits) {
   for (size_t i = 0; i < expected.size(); ++i) {
     ASSERT_LE(std::abs(samples[i] - expected[i]), kHalfUlp * std::max(kLeastNormal, expected[i]));
   }
+}
+
+TEST(HalfBtfTest, SpilledSamplesAreThoseInMemory) {
+  const auto btf = SmallBtf();
+  const TempFolder folder;
+  const auto half = HalfBtf::CopyOf(*btf, 1 << 20, {});
+  ASSERT_TRUE(half.ok()) << half.status();
+  const auto spilled = HalfBtf::SpillingCopyOf(*btf, HalfBtf::SizeBytes(*btf) - 1, folder.path(), {});
+  ASSERT_TRUE(spilled.ok()) << spilled.status();
+  EXPECT_EQ(AllSamples(**spilled, 1), AllSamples(**half));
+  EXPECT_EQ(AllSamples(**spilled, 3), AllSamples(**half));
+  EXPECT_TRUE(std::filesystem::is_empty(folder.path()));  // the file has no name
+  // What memory holds needs no folder.
+  EXPECT_TRUE(HalfBtf::SpillingCopyOf(*btf, 1 << 20, folder.path() / "none", {}).ok());
+  EXPECT_FALSE(HalfBtf::SpillingCopyOf(*btf, 0, folder.path() / "none", {}).ok());
 }
 
 TEST(HalfBtfTest, RefusesWhatExceedsTheLimit) {

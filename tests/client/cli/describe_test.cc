@@ -41,6 +41,10 @@ TEST(DescribeTest, TablesAndRecordsAlign) {
             "a:     1\nb.c:   0.12346\nlist:  1 2");
   EXPECT_EQ(TextRecord(Json{{"pairs", {{{"light_deg", 15}}, {{"light_deg", 45}}}}}),
             "pairs.0:  {\"light_deg\":15}\npairs.1:  {\"light_deg\":45}");
+  EXPECT_EQ(
+      TextRecord(Json{
+          {"told", {"one thing", "and another"}}, {"words", {"red", "green"}}, {"empty", Json::array()}}),
+      "told:   one thing\ntold:   and another\nwords:  red green");
 }
 
 }  // namespace

@@ -85,6 +85,16 @@ TEST_F(ServerTest, WrongArgumentsAreRefusedBeforeAnyJob) {
   EXPECT_EQ(reason_of([](auto& request) { request.set_lights("many"); }), "ARGUMENT_INVALID");
   EXPECT_EQ(reason_of([](auto& request) { request.set_size(16); }), "ARGUMENT_INVALID");
   EXPECT_EQ(reason_of([](auto& request) { request.set_size(100000); }), "ARGUMENT_INVALID");
+  EXPECT_EQ(reason_of([](auto& request) { request.mutable_encode()->set_codec("auto"); }),
+            "ARGUMENT_INVALID");
+  EXPECT_EQ(reason_of([](auto& request) { request.mutable_encode()->set_max_error(0.1); }),
+            "ARGUMENT_INVALID");
+  EXPECT_EQ(reason_of([](auto& request) {
+              request.mutable_encode()->set_codec("dfmf");
+              request.mutable_encode()->set_rank(3);
+              request.mutable_encode()->set_max_bytes(1000);
+            }),
+            "ARGUMENT_INVALID");
   EXPECT_EQ(reason_of([](auto& request) { request.mutable_encode()->set_codec("jpeg"); }),
             "ARGUMENT_INVALID");
   EXPECT_EQ(reason_of([](auto& request) { request.set_name("materials/a/b"); }), "NAME_INVALID");
