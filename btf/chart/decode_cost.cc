@@ -81,15 +81,17 @@ PlaneOfTexels MakePlane(const Material& material) {
   return plane;
 }
 
-absl::StatusOr<double> LeastFrameSeconds(OffscreenContext& context, const PreviewScene& scene,
+absl::StatusOr<double> LeastFrameSeconds(GlPreview& preview, const PreviewScene& scene,
                                          const RunContext& run_context) {
+  // The first picture also compiles the shaders.
+  TESSERA_RETURN_IF_ERROR(preview.Render(scene, run_context).status());
   constexpr int kMostRounds = 3;
   constexpr double kEnoughSeconds = 0.4;
   double least = std::numeric_limits<double>::infinity();
   double spent = 0.0;
   for (int round = 0; round < kMostRounds && spent < kEnoughSeconds; ++round) {
     const auto start = std::chrono::steady_clock::now();
-    TESSERA_ASSIGN_OR_RETURN(const Image image, RenderGl(context, scene, run_context));
+    TESSERA_ASSIGN_OR_RETURN(const Image image, preview.Render(scene, run_context));
     const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
     if (image.at(0, 0)[3] != 1.0F || image.at(scene.width - 1, scene.height - 1)[3] != 1.0F) {
       return absl::InternalError("the plane does not cover the frame");
@@ -162,16 +164,14 @@ absl::StatusOr<GlFrameCost> MeasureGlFrame(OffscreenContext& context, const Mate
   const double unit_per_pixel =
       kFrameTexelsPerPixel * 2.0 / (static_cast<double>(plane.repeats) * plane.tile_set.tile_size);
   scene.camera.eye = {0.0, 0.0, 0.5 * unit_per_pixel * kFrameHeight / std::tan(0.5 * scene.camera.fov_y_rad)};
-  const std::vector<Light> lit = scene.lights;
-  scene.lights[0].place = {0.0, 0.0, -1.0};
   GlFrameCost cost;
-  // The first picture also compiles the shaders.
-  TESSERA_RETURN_IF_ERROR(RenderGl(context, scene, quiet).status());
-  TESSERA_ASSIGN_OR_RETURN(cost.rest_s, LeastFrameSeconds(context, scene, quiet));
-  scene.lights = lit;
-  TESSERA_ASSIGN_OR_RETURN(cost.bilinear_s, LeastFrameSeconds(context, scene, quiet));
+  const auto start = std::chrono::steady_clock::now();
+  TESSERA_ASSIGN_OR_RETURN(const std::unique_ptr<GlPreview> preview,
+                           GlPreview::Create(context, plane.dressing, plane.tile_set));
+  cost.prepare_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  TESSERA_ASSIGN_OR_RETURN(cost.bilinear_s, LeastFrameSeconds(*preview, scene, quiet));
   scene.filter = Filter::kNearest;
-  TESSERA_ASSIGN_OR_RETURN(cost.nearest_s, LeastFrameSeconds(context, scene, quiet));
+  TESSERA_ASSIGN_OR_RETURN(cost.nearest_s, LeastFrameSeconds(*preview, scene, quiet));
   return cost;
 }
 

@@ -21,21 +21,19 @@ inline constexpr int kDecodeRounds = 3;
 [[nodiscard]] absl::StatusOr<CpuDecodeCost> MeasureCpuDecode(const Material& material,
                                                              const RunContext& context);
 
-// Seconds of wall-clock time of RenderGl, minima of as many rounds as fit in 0.4 s, one to three: a frame
+// Seconds of wall-clock time, minima of as many further pictures as fit in 0.4 s, one to three: a frame
 // of kFrameWidth x kFrameHeight that a plane covers whole, facing the eye, kFrameTexelsPerPixel texels to the
 // pixel, its texels the material's (the largest square of them from the top left, repeated).
 struct GlFrameCost {
   double nearest_s = 0.0;   // one texel a pixel
   double bilinear_s = 0.0;  // four
-  // The same frame without decoding, lit from behind: packing and sending the tables, the surface, reading
-  // the picture back.
-  double rest_s = 0.0;
+  double prepare_s = 0.0;   // GlPreview::Create, before the first: packing and sending the tables
 };
 inline constexpr int kFrameWidth = 640;
 inline constexpr int kFrameHeight = 480;
 inline constexpr double kFrameTexelsPerPixel = 0.7;
 
-// Errors: RenderGl's; CANCELLED.
+// Errors: GlPreview's; CANCELLED.
 [[nodiscard]] absl::StatusOr<GlFrameCost> MeasureGlFrame(OffscreenContext& context, const Material& material,
                                                          const RunContext& run_context);
 

@@ -241,7 +241,7 @@ upper edge.</li>
 the smallest hash of their index. Each class counts by the number of its pairs.</li>
 <li><b>Decoding on the CPU</b>: processor time of one thread, all texels of one view and light (streaming), or another texel, view
 and light each time (random). <b>GL frame</b>: wall clock of a frame of 640x480 on OSMesa that a plane covers whole, 0.7 texels to
-the pixel, one texel a pixel (nearest) or four (bilinear); "rest" is the same frame without decoding. Each the least of up to three.</li>
+the pixel, one texel a pixel (nearest) or four (bilinear); "prepare" is what comes before the first picture of a material: packing and sending its tables. Frames are the least of up to three.</li>
 <li><b>Encoding</b>: wall clock and the processor time of all threads, with reading the source from memory.</li>
 <li><b>JPEG</b>: baseline, 4:2:0, Huffman tables of its own for each file, of sRGB codes: values above 1 are cut. Its access to one
 texel decodes one file. It has no images at held-out directions: the nearest measured one is shown, and the held-out ones are not

@@ -153,7 +153,7 @@ SourceChart HandMade() {
   chart.pictures_per_class = 8;
   ChartPoint point{.method = "dsh", .setting = "4x4", .size_bytes = 1000, .encode_s = 1.5};
   point.cpu = {.streaming_s = 2e-9, .random_s = 3e-6};
-  point.gl = GlFrameCost{.nearest_s = 0.1, .bilinear_s = 0.3, .rest_s = 0.05};
+  point.gl = GlFrameCost{.nearest_s = 0.1, .bilinear_s = 0.3, .prepare_s = 0.05};
   SplitFigures figures;
   for (size_t limit = 0; limit < kNumAngleLimits; ++limit) {
     figures[limit] = {
@@ -199,7 +199,7 @@ TEST(CodecChartTest, CsvHasOneRowASplitAndLimitThatHasPairs) {
   EXPECT_EQ(
       line,
       "source,method,setting,split,angle_limit_deg,bytes,rate,encode_s,encode_cpu_s,streaming_ns,random_us,"
-      "gl_nearest_ms,gl_bilinear_ms,gl_rest_ms,rmse,relative_rmse,psnr_db,dssim,flip,pairs,row_stride,"
+      "gl_nearest_ms,gl_bilinear_ms,gl_prepare_ms,rmse,relative_rmse,psnr_db,dssim,flip,pairs,row_stride,"
       "pictures,"
       "pictures_per_class,refusal");
   const size_t num_columns = Cells(line).size();
