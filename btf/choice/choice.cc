@@ -122,7 +122,7 @@ absl::StatusOr<ModelChoice> ModelChooser::Choose() {
   std::erase_if(meeting,
                 [&](const ModelChoice& choice) { return static_cast<double>(bytes(choice)) > most; });
   return std::ranges::min(meeting, {}, [&](const ModelChoice& choice) {
-    return std::tuple(FiguresOf(choice).coefficients_read, bytes(choice), choice.ladder);
+    return std::tuple(FiguresOf(choice).coefficients_read, FiguresOf(choice).error(), choice.ladder);
   });
 }
 

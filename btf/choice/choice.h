@@ -1,21 +1,19 @@
 // Which model a BTF needs: the smallest and cheapest that meets a bound on directions held out of the
-// encoder: model no more than a scene needs.
+// encoder.
 //
-//   ModelChooser chooser(goal, ladders, meters...);
+//   ModelChooser chooser({.max_error = 0.05}, ChoiceLadders(info, params), meter);
 //   TESSERA_ASSIGN_OR_RETURN(const ModelChoice choice, chooser.Choose());
 //
 // The rule. Errors are root mean squares over linear RGB, absolute; the error of a model is the worse of two:
 // at held-out lights, encoded without every fifth light, and at held-out views, likewise (data/subset_btf.h).
 //
-//   max_error   of each codec the smallest setting whose error is at most max_error
-//   max_bytes   of each codec the smallest setting that fits and whose error is at most kEqualErrors times
-//   the
-//               lowest among all that fit (kEnvironment: among those that project on spherical harmonics, if
-//               one fits): what is no more accurate is not larger
-//   then        kEnvironment: those that project on spherical harmonics, if there is one
-//               those of at most kEqualBytes times the bytes of the smallest
-//               of these the one that reads the fewest coefficients of a texel for one light and view,
-//               then the smallest, then the first in ChoiceLadders' order
+// - max_error: of each codec the smallest setting whose error is at most max_error.
+// - max_bytes: of each codec the smallest setting that fits and whose error is at most kEqualErrors times the
+//   lowest among all that fit (kEnvironment: among those that project on spherical harmonics, if one fits):
+//   what is no more accurate is not larger.
+// - Of these, kEnvironment: those that project on spherical harmonics, if there is one; those of at most
+//   kEqualBytes times the bytes of the smallest; the one that reads the fewest coefficients of a texel for
+//   one light and view; then the most accurate; then the first in ChoiceLadders' order.
 #pragma once
 
 #include <functional>

@@ -71,6 +71,12 @@ TEST_F(ModelChooserTest, OfEqualSizesTheCheapestToDecodeIsTaken) {
   // 4,000 and 4,100 bytes are equal; 2 coefficients are fewer than 16.
   ModelChooser chooser = ChooserFor({.max_error = 0.06});
   EXPECT_EQ(NameOf(chooser), "sh of 1");
+  points_["low"][2].coefficients = 2;  // equal in that, too: 0.058 is less than 0.06
+  ModelChooser equal = ChooserFor({.max_error = 0.06});
+  EXPECT_EQ(NameOf(equal), "sh of 1");
+  points_["low"][2].error = 0.057;
+  ModelChooser better = ChooserFor({.max_error = 0.06});
+  EXPECT_EQ(NameOf(better), "low of 2");
   points_["sh"][1].bytes = 4'300;  // 7.5% more are not
   ModelChooser larger = ChooserFor({.max_error = 0.06});
   EXPECT_EQ(NameOf(larger), "low of 2");
