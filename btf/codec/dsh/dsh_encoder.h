@@ -7,9 +7,8 @@
 //            spread over the texture
 //
 // Rows of texels are streamed, groups of texels fitted at once (dsh_fitter.h). Source of the first:
-// [Leung2007] 3.1, 5 and appendix; the last is ours. One ridge a pass costs nothing and loses nothing: on the
-// wool, 25 x 25, a ridge for each signal changes the error on held-out lights from 0.03315 to 0.03313, on
-// held-out views from 0.03955 to 0.03949.
+// [Leung2007] 3.1, 5 and appendix; the last is ours.
+// One ridge serves a pass, not one for each signal: the directions decide how much of a signal can be told.
 #pragma once
 
 #include <absl/status/statusor.h>
