@@ -263,7 +263,6 @@ void PreviewDrawing::DrawSamples(int first_row, int rows) {
   gl_.Disable(GL_BLEND);
   gl_.Disable(GL_CULL_FACE);
   gl_.Enable(GL_DEPTH_TEST);
-  gl_.DepthMask(GL_TRUE);
   gl_.FrontFace(GL_CW);
 
   const Eigen::Vector3d eye = view_.eye - resources_.triangles.centre;
@@ -291,12 +290,9 @@ void PreviewDrawing::DrawSamples(int first_row, int rows) {
   for (int sample = 0; sample < kSamplesPerPixel; ++sample) {
     gl_.FramebufferTextureLayer(GL_FRAMEBUFFER, GL_COLOR_ATTACHMENT0, resources_.targets->samples.name(), 0,
                                 sample);
-    // Drawn rather than cleared: llvmpipe clears texels of 16 bytes one by one.
-    gl_.DepthFunc(GL_ALWAYS);
-    gl_.UseProgram(empty_program_);
-    gl_.BindVertexArray(resources_.no_vertices.name());
-    gl_.DrawArrays(GL_TRIANGLES, 0, 3);
+    gl_.DepthMask(GL_TRUE);
     gl_.DepthFunc(GL_LESS);
+    gl_.Clear(GL_DEPTH_BUFFER_BIT);
     gl_.UseProgram(surface_program_);
     gl_.BindVertexArray(resources_.vertex_array.name());
     // The pixel centre takes the sample's place when the surface moves the other way.
@@ -304,6 +300,13 @@ void PreviewDrawing::DrawSamples(int first_row, int rows) {
                   static_cast<float>(-2.0 * kSampleOffsets[sample][1] / scene_.height));
     gl_.DrawElements(GL_TRIANGLES, static_cast<GLsizei>(resources_.triangles.indices.size()), GL_UNSIGNED_INT,
                      nullptr);
+    // Samples that nothing covers are drawn afterwards rather than all cleared before: llvmpipe clears texels
+    // of 16 bytes one by one.
+    gl_.DepthMask(GL_FALSE);
+    gl_.DepthFunc(GL_LEQUAL);
+    gl_.UseProgram(empty_program_);
+    gl_.BindVertexArray(resources_.no_vertices.name());
+    gl_.DrawArrays(GL_TRIANGLES, 0, 3);
   }
   gl_.BindFramebuffer(GL_FRAMEBUFFER, resources_.targets->pixel_target.name());
   gl_.Viewport(0, 0, scene_.width, rows);
@@ -360,9 +363,9 @@ absl::StatusOr<Image> PreviewDrawing::Draw(const RunContext& context) {
   // The codec's program first: when the context is full it drops all others.
   TESSERA_ASSIGN_OR_RETURN(
       shade_program_,
-      state.Program(ShadeVertexShader(), ShadeFragmentShader(resources_.codec_source, scene_.filter)));
+      state.Program(FrameVertexShader(), ShadeFragmentShader(resources_.codec_source, scene_.filter)));
   TESSERA_ASSIGN_OR_RETURN(surface_program_, state.Program(SurfaceVertexShader(), SurfaceFragmentShader()));
-  TESSERA_ASSIGN_OR_RETURN(empty_program_, state.Program(ShadeVertexShader(), EmptySampleFragmentShader()));
+  TESSERA_ASSIGN_OR_RETURN(empty_program_, state.Program(FrameVertexShader(), EmptySampleFragmentShader()));
   const int band_rows = std::clamp(kBandPixels / scene_.width, 1, scene_.height);
   std::unique_ptr<Targets>& targets = resources_.targets;
   if (targets == nullptr || targets->width != scene_.width || targets->rows != band_rows) {

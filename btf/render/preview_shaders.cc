@@ -36,17 +36,16 @@ void main() {
 }
 )";
 
+constexpr char kFrameVertex[] = R"(#version 450 core
+void main() {
+  gl_Position = vec4(vec2((gl_VertexID << 1) & 2, gl_VertexID & 2) * 2.0 - 1.0, 1.0, 1.0);
+}
+)";
+
 constexpr char kEmptySampleFragment[] = R"(#version 450 core
 out uvec4 surface_sample;
 void main() {
   surface_sample = uvec4(0u);
-  gl_FragDepth = 1.0;
-}
-)";
-
-constexpr char kShadeVertex[] = R"(#version 450 core
-void main() {
-  gl_Position = vec4(vec2((gl_VertexID << 1) & 2, gl_VertexID & 2) * 2.0 - 1.0, 0.0, 1.0);
 }
 )";
 
@@ -256,11 +255,11 @@ std::string SurfaceVertexShader() {
 std::string SurfaceFragmentShader() {
   return kSurfaceFragment;
 }
+std::string FrameVertexShader() {
+  return kFrameVertex;
+}
 std::string EmptySampleFragmentShader() {
   return kEmptySampleFragment;
-}
-std::string ShadeVertexShader() {
-  return kShadeVertex;
 }
 
 std::string ShadeFragmentShader(const std::string& codec_source, Filter filter) {

@@ -12,9 +12,10 @@ namespace tessera {
 
 [[nodiscard]] std::string SurfaceVertexShader();
 [[nodiscard]] std::string SurfaceFragmentShader();
-// Nothing, as far as can be; drawn over the whole frame by ShadeVertexShader().
+// The whole frame, at the largest depth.
+[[nodiscard]] std::string FrameVertexShader();
+// Nothing; drawn over the whole frame.
 [[nodiscard]] std::string EmptySampleFragmentShader();
-[[nodiscard]] std::string ShadeVertexShader();
 // `codec_source` is CodecGlsl::source.
 [[nodiscard]] std::string ShadeFragmentShader(const std::string& codec_source, Filter filter);
 
