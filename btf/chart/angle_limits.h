@@ -12,6 +12,7 @@ namespace tessera {
 
 inline constexpr std::array<double, 4> kAngleLimitsDeg = {45.0, 60.0, 75.0, 90.0};
 inline constexpr size_t kNumAngleLimits = kAngleLimitsDeg.size();
+inline constexpr size_t kAllAngles = kNumAngleLimits - 1;  // index of the limit that leaves none out
 inline constexpr std::array<const char*, kNumAngleLimits> kAngleLimitNames = {"45", "60", "75", "all"};
 
 // The first limit that the pair counts for: it counts for that and all after it.

@@ -21,8 +21,6 @@
 namespace tessera {
 namespace {
 
-constexpr size_t kAll = kNumAngleLimits - 1;
-
 constexpr char kTitle[] = "Codecs: bytes, speed, error";
 constexpr char kStyle[] = R"(
 h1 { font-size: 2em; margin-bottom: .2em; }
@@ -143,7 +141,7 @@ std::string ErrorPlot(const SourceChart& chart, const Cost& cost, const Metric& 
       const Look look = LookOf(point.method);
       plot.series.push_back({point.method, look.colour, look.marker, {}});
     }
-    plot.series.back().points.push_back({x, metric.of((*point.splits[split])[kAll]), point.setting});
+    plot.series.back().points.push_back({x, metric.of((*point.splits[split])[kAllAngles]), point.setting});
   });
   return SvgOf(plot);
 }
@@ -229,7 +227,7 @@ std::string Fronts(const SourceChart& chart) {
       std::vector<TwoCosts> costs;
       std::vector<const ChartPoint*> points;
       ForEachShown(chart, cost, split, [&](const ChartPoint& point, double x) {
-        costs.push_back({x, (*point.splits[split])[kAll].squares.rmse()});
+        costs.push_back({x, (*point.splits[split])[kAllAngles].squares.rmse()});
         points.push_back(&point);
       });
       const std::vector<bool> front = ParetoFront(costs);
@@ -295,7 +293,7 @@ std::string FullTable(const SourceChart& chart) {
         absl::StrAppend(&html, "<td colspan=\"5\">", HtmlEscaped(point.refusal), "</td>");
         continue;
       }
-      const LimitFigures& all = (*split)[kAll];
+      const LimitFigures& all = (*split)[kAllAngles];
       figure(absl::StrFormat("%.4f", all.squares.rmse()));
       figure(absl::StrFormat("%.4f", all.squares.relative_rmse()));
       figure(absl::StrFormat("%.2f", all.squares.psnr_db()));

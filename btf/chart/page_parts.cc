@@ -16,7 +16,6 @@
 namespace tessera {
 namespace {
 
-constexpr size_t kAll = kNumAngleLimits - 1;
 constexpr double kDifferenceGain = 4.0;  // of the pictures of differences
 
 const ChartPoint* Find(const SourceChart& chart, std::string_view method, std::string_view setting) {
@@ -27,7 +26,7 @@ const ChartPoint* Find(const SourceChart& chart, std::string_view method, std::s
 }
 
 double Rmse(const ChartPoint& point, size_t split) {
-  return (*point.splits[split])[kAll].squares.rmse();
+  return (*point.splits[split])[kAllAngles].squares.rmse();
 }
 
 const char* PlaceOf(Split split) {
@@ -86,7 +85,7 @@ std::string FactsOf(const SourceChart& chart) {
   for (const ChartPoint& point : chart.points) {
     if (point.splits[0]) {
       absl::StrAppendFormat(&text, " RMS of the samples: %.4f.",
-                            (*point.splits[0])[kAll].squares.reference_rms());
+                            (*point.splits[0])[kAllAngles].squares.reference_rms());
       break;
     }
   }

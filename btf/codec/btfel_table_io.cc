@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstring>
 #include <limits>
 #include <numeric>
 #include <string_view>
@@ -19,6 +20,7 @@ namespace {
 constexpr std::array<std::string_view, 6> kReservedNames = {"coefficients", "offset", "step",
                                                             "views",        "lights", "btfel_order"};
 constexpr int64_t kMaxCoefficients = int64_t{1} << 20;
+constexpr uint64_t kInMemory = std::numeric_limits<uint64_t>::max();
 // Stored directions are float32: their length is 1 and their height >= 0 only up to rounding.
 constexpr double kUnitLengthTolerance = 1e-3;
 constexpr double kHorizonTolerance = 1e-5;
@@ -292,7 +294,8 @@ absl::StatusOr<std::vector<int64_t>> ReadCoefficients(const Container& container
           extents, [](int64_t extent) { return extent < 1 || extent > std::numeric_limits<int>::max(); })) {
     return absl::InvalidArgumentError("section 'coefficients': an extent is 0 or above 2^31 - 1");
   }
-  table.codes = SectionValues<uint8_t>(*section);
+  TESSERA_ASSIGN_OR_RETURN(table.codes, CodeBuffer::Create(section->bytes.size(), kInMemory));
+  std::memcpy(table.codes.data(), section->bytes.data(), section->bytes.size());
   return extents;
 }
 
@@ -362,7 +365,7 @@ absl::Status ReadCoefficientsByEnergy(const Container& container, BtfelTable& ta
     sections.push_back(section);
   }
   const size_t n = static_cast<size_t>(sections[0]->shape[0]);
-  table.codes.assign(n * k, 0);
+  TESSERA_ASSIGN_OR_RETURN(table.codes, CodeBuffer::Create(n * k, kInMemory));
   size_t begin = 0;
   for (const Section* section : sections) {
     const size_t columns = static_cast<size_t>(section->shape[1]);

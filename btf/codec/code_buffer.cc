@@ -5,6 +5,7 @@
 
 #include <absl/strings/str_cat.h>
 
+#include "btf/base/huge_pages.h"
 #include "btf/base/status_macros.h"
 
 namespace tessera {
@@ -25,7 +26,11 @@ absl::StatusOr<CodeBuffer> CodeBuffer::Create(uint64_t size, uint64_t memory_lim
                                               const std::filesystem::path& folder) {
   if (size <= memory_limit_bytes) {
     try {
-      return CodeBuffer(std::vector<uint8_t>(size));
+      std::vector<uint8_t> codes;
+      codes.reserve(size);
+      AdviseHugePages(codes.data(), codes.capacity());
+      codes.resize(size);
+      return CodeBuffer(std::move(codes));
     } catch (const std::bad_alloc&) {
       return absl::ResourceExhaustedError(absl::StrCat("no ", size, " bytes of memory for the codes"));
     }

@@ -177,6 +177,17 @@ void DecodeTexel(const CodeForm& form, const uint8_t* codes, float* rgb) {
 
 }  // namespace
 
+Eigen::Array3d LinearForm::ValueOf(std::span<const double> coefficients) const {
+  Eigen::Array3d rgb = Eigen::Array3d::Zero();
+  const double* weight = weights.data();
+  for (const Run& run : runs) {
+    for (int i = run.first; i < run.first + run.count; ++i) {
+      rgb[run.channel] += *weight++ * coefficients[i];
+    }
+  }
+  return rgb;
+}
+
 void Decoder::Dequantize(std::span<const uint8_t> codes, std::span<double> values) const {
   assert(codes.size() == offset_.size() && values.size() == offset_.size());
   for (size_t i = 0; i < offset_.size(); ++i) {
@@ -187,15 +198,7 @@ void Decoder::Dequantize(std::span<const uint8_t> codes, std::span<double> value
 Eigen::Array3d Decoder::Evaluate(std::span<const double> coefficients, const Eigen::Vector3d& light,
                                  const Eigen::Vector3d& view) const {
   assert(std::cmp_equal(coefficients.size(), num_coefficients()));
-  const LinearForm form = Form(light, view);
-  Eigen::Array3d rgb = Eigen::Array3d::Zero();
-  const double* weight = form.weights.data();
-  for (const LinearForm::Run& run : form.runs) {
-    for (int i = run.first; i < run.first + run.count; ++i) {
-      rgb[run.channel] += *weight++ * coefficients[i];
-    }
-  }
-  return rgb;
+  return Form(light, view).ValueOf(coefficients);
 }
 
 Eigen::Array3d Decoder::Decode(std::span<const uint8_t> codes, const Eigen::Vector3d& light,

@@ -28,6 +28,9 @@ struct LinearForm {
   };
   std::vector<Run> runs;
   std::vector<double> weights;
+
+  // The value for `coefficients` [k].
+  [[nodiscard]] Eigen::Array3d ValueOf(std::span<const double> coefficients) const;
 };
 
 // Immutable and safe to share between threads. Keeps no reference to the codes, only to copies of the shared

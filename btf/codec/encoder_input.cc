@@ -9,8 +9,8 @@
 namespace tessera {
 namespace {
 
-absl::Status CheckDirections(const std::vector<Direction>& directions, const char* name,
-                             size_t max_directions) {
+absl::Status CheckSourceDirections(const std::vector<Direction>& directions, const char* name,
+                                   size_t max_directions) {
   if (directions.empty()) {
     return absl::InvalidArgumentError(absl::StrCat("the BTF has no ", name));
   }
@@ -37,8 +37,8 @@ absl::Status CheckEncoderInput(const BtfInfo& info, size_t max_directions) {
     return absl::InvalidArgumentError(
         absl::StrCat("the BTF is ", info.width, "x", info.height, " texels, expected at least 1x1"));
   }
-  TESSERA_RETURN_IF_ERROR(CheckDirections(info.views, "views", max_directions));
-  return CheckDirections(info.lights, "lights", max_directions);
+  TESSERA_RETURN_IF_ERROR(CheckSourceDirections(info.views, "views", max_directions));
+  return CheckSourceDirections(info.lights, "lights", max_directions);
 }
 
 absl::Status IllegalSampleError(const BtfInfo& info, int row_begin, std::span<const float> samples) {

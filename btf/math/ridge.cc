@@ -31,14 +31,17 @@ RidgeRegression::RidgeRegression(const Eigen::MatrixXd& basis, const Eigen::Matr
   eigenvalues_ = projection_.rowwise().squaredNorm();
 }
 
-double RidgeRegression::ChooseRidge(const Eigen::Ref<const Eigen::MatrixXd>& signals,
-                                    double max_ridge) const {
-  const double num_samples = static_cast<double>(projection_.cols());
+SignalEnergies RidgeRegression::Energies(const Eigen::Ref<const Eigen::MatrixXd>& signals) const {
   assert(signals.rows() == projection_.cols());
+  return {(projection_ * signals).rowwise().squaredNorm(), signals.squaredNorm()};
+}
+
+double RidgeRegression::ChooseRidge(const SignalEnergies& signals, double max_ridge) const {
+  const double num_samples = static_cast<double>(projection_.cols());
   const double largest = eigenvalues_.maxCoeff();
   // By eigenvector, the part of the signals' energy that lies along it; what is left no fit can reach.
-  Eigen::ArrayXd energies = (projection_ * signals).rowwise().squaredNorm();
-  double unreachable = signals.squaredNorm();
+  Eigen::ArrayXd energies = signals.projected;
+  double unreachable = signals.total;
   for (Eigen::Index i = 0; i < energies.size(); ++i) {
     energies[i] = eigenvalues_[i] > kNullEigenvalue * largest ? energies[i] / eigenvalues_[i] : 0.0;
     unreachable -= energies[i];

@@ -10,13 +10,19 @@
 // takes sums over the signals of p_i^2 and |f|^2 only.
 //
 //   RidgeRegression regression(basis);
-//   const double ridge = regression.ChooseRidge(signals, 10.0);   // a sample of them is enough
+//   const double ridge = regression.ChooseRidge(regression.Energies(signals), 10.0);   // a sample is enough
 //   coefficients = regression.Fit(ridge) * all_signals;
 #pragma once
 
 #include <Eigen/Core>
 
 namespace tessera {
+
+// What the choice of a ridge needs of signals; that of more signals is the sum.
+struct SignalEnergies {
+  Eigen::VectorXd projected;  // [n], sums of p_i^2
+  double total = 0.0;         // sum of |f|^2
+};
 
 // Immutable after construction, safe to share between threads.
 class RidgeRegression {
@@ -35,9 +41,11 @@ class RidgeRegression {
   explicit RidgeRegression(const Eigen::MatrixXd& basis)
       : RidgeRegression(basis, Eigen::MatrixXd::Identity(basis.cols(), basis.cols())) {}
 
-  // One of the ridges above up to max_ridge (> kMinRidge, relative as well), absolute, for finite signals
-  // [M][any number]. 0 when the basis is 0.
-  [[nodiscard]] double ChooseRidge(const Eigen::Ref<const Eigen::MatrixXd>& signals, double max_ridge) const;
+  // Of finite signals [M][any number].
+  [[nodiscard]] SignalEnergies Energies(const Eigen::Ref<const Eigen::MatrixXd>& signals) const;
+
+  // One of the ridges above up to max_ridge (> kMinRidge, relative as well), absolute. 0 when the basis is 0.
+  [[nodiscard]] double ChooseRidge(const SignalEnergies& signals, double max_ridge) const;
 
   // [n][M]; ridge > 0, or 0 for a basis of 0 (then 0).
   [[nodiscard]] Eigen::MatrixXd Fit(double ridge) const;

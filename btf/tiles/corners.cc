@@ -13,9 +13,9 @@
 namespace tessera {
 namespace {
 
-constexpr int kStarts = 8;       // random starts
-constexpr int kSweeps = 4;       // over all samples; the last is greedy
-constexpr int kCandidates = 80;  // cut for each sample and sweep
+constexpr int kStarts = 8;             // random starts
+constexpr int kSweeps = 4;             // over all samples; the last is greedy
+constexpr int kCornerCandidates = 80;  // cut for each sample and sweep
 // What a set of samples costs: the mean mismatch of its cuts in mean steps, plus these prices, each on
 // average over the samples. Two samples from one place, falling to 0 where they are a strip height apart.
 // Dear enough that no cut is worth it: a set cut from one patch has no seams at all, and every tile looks
@@ -161,7 +161,7 @@ class CornerSearch {
   void Improve(int sample, bool greedy, const std::stop_token& stop) {
     MakeQuery(sample);
     const std::vector<Candidate> candidates =
-        search_.Search(query_, turns_[sample], nullptr, 0.0, kCandidates, 1, stop);
+        search_.Search(query_, turns_[sample], nullptr, 0.0, kCornerCandidates, 1, stop);
     const Patch before = samples_[sample];
     std::vector<Patch> patches = {before};
     std::vector<double> costs = {CostAround(sample)};

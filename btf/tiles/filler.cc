@@ -18,7 +18,7 @@ constexpr double kLargestWindowShare = 0.75;
 constexpr int kFirstFeatures = 5;
 // Share of a first window that should be known already; below it a place is less wanted.
 constexpr double kWantedOverlap = 0.15;
-constexpr int kCandidates = 24;  // kept by a search
+constexpr int kPatchCandidates = 24;  // kept by a search
 
 // How a window is matched. First windows bring most of the content, so they range far and pay for repetition;
 // improvements look for the best fit.
@@ -139,7 +139,7 @@ int MatchWindow(const FillParams& params, const Window& window, const Matching& 
   MakeQuery(canvas, window, scratch.query);
   const int separation = std::max(1, matching.separation * params.feature_size / 8);
   std::vector<Candidate> candidates = scratch.search.Search(
-      scratch.query, params.turns, params.usage, matching.repetition, kCandidates, separation, stop);
+      scratch.query, params.turns, params.usage, matching.repetition, kPatchCandidates, separation, stop);
   candidates = SampleCandidates(std::move(candidates), matching.trials, matching.temperature, rng);
   std::optional<Patch> best_patch;
   PatchCut best_cut;

@@ -9,7 +9,7 @@
 namespace tessera::cli {
 namespace {
 
-absl::Status RunList(Session& session) {
+absl::Status ListArrangements(Session& session) {
   TESSERA_ASSIGN_OR_RETURN(Client * client, session.Connect());
   TESSERA_ASSIGN_OR_RETURN(const std::vector<v1::Arrangement> arrangements,
                            client->ListArrangements(session.Context()));
@@ -24,7 +24,7 @@ absl::Status RunList(Session& session) {
   return absl::OkStatus();
 }
 
-absl::Status RunShow(Session& session, const std::string& name) {
+absl::Status ShowArrangement(Session& session, const std::string& name) {
   TESSERA_ASSIGN_OR_RETURN(const std::string full_name, FullArrangementName(name));
   TESSERA_ASSIGN_OR_RETURN(Client * client, session.Connect());
   TESSERA_ASSIGN_OR_RETURN(const v1::Arrangement arrangement,
@@ -39,12 +39,13 @@ void AddArrangementCommands(CLI::App& app, Session& session) {
   CLI::App* noun = app.add_subcommand("arrangement", "Canonical lists of tiles, independent of material");
   noun->require_subcommand(1);
   CLI::App* list = noun->add_subcommand("list", "Every arrangement");
-  list->callback([&session] { session.run = [&session] { return RunList(session); }; });
+  list->callback([&session] { session.run = [&session] { return ListArrangements(session); }; });
 
   const auto name = std::make_shared<std::string>();
   CLI::App* show = noun->add_subcommand("show", "One arrangement and its tile codes");
   show->add_option("ARRANGEMENT", *name, "plane-16, surface-96")->required();
-  show->callback([&session, name] { session.run = [&session, name] { return RunShow(session, *name); }; });
+  show->callback(
+      [&session, name] { session.run = [&session, name] { return ShowArrangement(session, *name); }; });
 }
 
 }  // namespace tessera::cli

@@ -9,7 +9,7 @@
 namespace tessera::cli {
 namespace {
 
-absl::Status RunList(Session& session) {
+absl::Status ListJobs(Session& session) {
   TESSERA_ASSIGN_OR_RETURN(Client * client, session.Connect());
   TESSERA_ASSIGN_OR_RETURN(const std::vector<v1::Job> jobs, client->ListJobs(session.Context()));
   Json all = Json::array();
@@ -23,7 +23,7 @@ absl::Status RunList(Session& session) {
   return absl::OkStatus();
 }
 
-absl::Status RunShow(Session& session, const std::string& name) {
+absl::Status ShowJob(Session& session, const std::string& name) {
   TESSERA_ASSIGN_OR_RETURN(const std::string full_name, FullJobName(name));
   TESSERA_ASSIGN_OR_RETURN(Client * client, session.Connect());
   TESSERA_ASSIGN_OR_RETURN(const v1::Job job, client->GetJob(full_name, session.Context()));
@@ -63,11 +63,11 @@ void AddJobCommands(CLI::App& app, Session& session) {
   const auto after_sequence = std::make_shared<uint64_t>(0);
 
   CLI::App* list = noun->add_subcommand("list", "Every job, with its state");
-  list->callback([&session] { session.run = [&session] { return RunList(session); }; });
+  list->callback([&session] { session.run = [&session] { return ListJobs(session); }; });
 
   CLI::App* show = noun->add_subcommand("show", "One job");
   show->add_option("JOB", *name, "Number of the job")->required();
-  show->callback([&session, name] { session.run = [&session, name] { return RunShow(session, *name); }; });
+  show->callback([&session, name] { session.run = [&session, name] { return ShowJob(session, *name); }; });
 
   CLI::App* watch =
       noun->add_subcommand("watch", "A line per event until the job ends; Ctrl-C leaves it running");

@@ -281,7 +281,7 @@ absl::Status RunGenerate(Session& session, const GenerateFlags& flags) {
   return WaitForMaterial(session, *client, job);
 }
 
-absl::Status RunList(Session& session) {
+absl::Status ListMaterials(Session& session) {
   TESSERA_ASSIGN_OR_RETURN(Client * client, session.Connect());
   TESSERA_ASSIGN_OR_RETURN(const std::vector<v1::Material> materials,
                            client->ListMaterials(session.Context()));
@@ -300,7 +300,7 @@ absl::Status RunList(Session& session) {
   return absl::OkStatus();
 }
 
-absl::Status RunShow(Session& session, const std::string& name) {
+absl::Status ShowMaterial(Session& session, const std::string& name) {
   TESSERA_ASSIGN_OR_RETURN(const std::string full_name, FullMaterialName(name));
   TESSERA_ASSIGN_OR_RETURN(Client * client, session.Connect());
   TESSERA_ASSIGN_OR_RETURN(const v1::Material material, client->GetMaterial(full_name, session.Context()));
@@ -424,11 +424,12 @@ void AddMaterialCommands(CLI::App& app, Session& session) {
   const auto name = std::make_shared<std::string>();
   const auto output = std::make_shared<std::string>();
   CLI::App* list = noun->add_subcommand("list", "Every material");
-  list->callback([&session] { session.run = [&session] { return RunList(session); }; });
+  list->callback([&session] { session.run = [&session] { return ListMaterials(session); }; });
 
   CLI::App* show = noun->add_subcommand("show", "One material, its source and its licence");
   show->add_option("MATERIAL", *name, "Name of the material")->required();
-  show->callback([&session, name] { session.run = [&session, name] { return RunShow(session, *name); }; });
+  show->callback(
+      [&session, name] { session.run = [&session, name] { return ShowMaterial(session, *name); }; });
 
   CLI::App* pull = noun->add_subcommand("pull", "Download a material's container");
   pull->add_option("MATERIAL", *name, "Name of the material")->required();

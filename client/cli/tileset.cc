@@ -74,7 +74,7 @@ absl::Status RunSynthesize(Session& session, const SynthesizeFlags& flags) {
   return absl::OkStatus();
 }
 
-absl::Status RunList(Session& session, const std::string& arrangement) {
+absl::Status ListTileSets(Session& session, const std::string& arrangement) {
   std::string parent;
   if (!arrangement.empty()) {
     TESSERA_ASSIGN_OR_RETURN(parent, FullArrangementName(arrangement));
@@ -95,7 +95,7 @@ absl::Status RunList(Session& session, const std::string& arrangement) {
   return absl::OkStatus();
 }
 
-absl::Status RunShow(Session& session, const std::string& name) {
+absl::Status ShowTileSet(Session& session, const std::string& name) {
   TESSERA_ASSIGN_OR_RETURN(const std::string full_name, FullTileSetName(name));
   TESSERA_ASSIGN_OR_RETURN(Client * client, session.Connect());
   TESSERA_ASSIGN_OR_RETURN(const v1::TileSet tile_set, client->GetTileSet(full_name, session.Context()));
@@ -128,7 +128,7 @@ absl::Status RunCertify(Session& session, const std::string& name) {
   return absl::OkStatus();
 }
 
-struct SheetFlags {
+struct TileSetSheetFlags {
   std::string name;
   std::string light = "30,135";
   std::string view = "0,0";
@@ -136,7 +136,7 @@ struct SheetFlags {
   std::string output;
 };
 
-absl::Status RunSheet(Session& session, const SheetFlags& flags) {
+absl::Status RunTileSetSheet(Session& session, const TileSetSheetFlags& flags) {
   TESSERA_ASSIGN_OR_RETURN(const std::string full_name, FullTileSetName(flags.name));
   SheetParams params;
   TESSERA_ASSIGN_OR_RETURN(params.light, ParseDirection(flags.light));
@@ -185,7 +185,7 @@ void AddSynthesize(CLI::App& noun, Session& session) {
 }
 
 void AddSheet(CLI::App& noun, Session& session) {
-  const auto flags = std::make_shared<SheetFlags>();
+  const auto flags = std::make_shared<TileSetSheetFlags>();
   CLI::App* command = noun.add_subcommand("sheet", "All tiles side by side in one picture");
   command->add_option("TILESET", flags->name, "ARRANGEMENT/NAME")->required();
   command->add_option("--light", flags->light, "TH,PH in degrees, TH from the normal")->capture_default_str();
@@ -194,7 +194,7 @@ void AddSheet(CLI::App& noun, Session& session) {
   command->add_option("-o,--output", flags->output, "File to write, .png (sRGB) or .exr (linear)")
       ->required();
   command->callback(
-      [&session, flags] { session.run = [&session, flags] { return RunSheet(session, *flags); }; });
+      [&session, flags] { session.run = [&session, flags] { return RunTileSetSheet(session, *flags); }; });
 }
 
 }  // namespace
@@ -211,12 +211,13 @@ void AddTileSetCommands(CLI::App& app, Session& session) {
   CLI::App* list = noun->add_subcommand("list", "Every tile set");
   list->add_option("--arrangement", *arrangement, "Only those of this arrangement");
   list->callback([&session, arrangement] {
-    session.run = [&session, arrangement] { return RunList(session, *arrangement); };
+    session.run = [&session, arrangement] { return ListTileSets(session, *arrangement); };
   });
 
   CLI::App* show = noun->add_subcommand("show", "One tile set, its source and its certificate");
   show->add_option("TILESET", *name, "ARRANGEMENT/NAME")->required();
-  show->callback([&session, name] { session.run = [&session, name] { return RunShow(session, *name); }; });
+  show->callback(
+      [&session, name] { session.run = [&session, name] { return ShowTileSet(session, *name); }; });
 
   CLI::App* pull = noun->add_subcommand("pull", "Download a tile set's container");
   pull->add_option("TILESET", *name, "ARRANGEMENT/NAME")->required();

@@ -4,6 +4,10 @@
 function(tessera_compile_options target)
   # -pthread everywhere: a precompiled header serves only files that are compiled with the same flags.
   target_compile_options(${target} PRIVATE -pthread -Wall -Wextra -Wno-missing-field-initializers)
+  if(CMAKE_UNITY_BUILD)
+    # It takes the types of a .cc file that another includes for those of a header.
+    target_compile_options(${target} PRIVATE -Wno-subobject-linkage)
+  endif()
   if(TESSERA_WARNINGS_AS_ERRORS)
     target_compile_options(${target} PRIVATE -Werror)
   endif()
@@ -40,17 +44,18 @@ function(tessera_headers name)
 endfunction()
 
 # tessera_library(NAME SOURCES a.cc.. [PUBLIC lib..] [PRIVATE lib..] [HEADERS <header>..])
-# HEADERS are precompiled for this library alone, in place of tessera_btf_headers.
+# HEADERS are precompiled for this library alone, in place of tessera_btf_headers; not in a unity build, whose few files
+# take less time without.
 function(tessera_library name)
   cmake_parse_arguments(ARG "" "" "SOURCES;PUBLIC;PRIVATE;HEADERS" ${ARGN})
   add_library(${name} STATIC ${ARG_SOURCES})
   target_include_directories(${name} PUBLIC "$<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}>")
   target_link_libraries(${name} PUBLIC ${ARG_PUBLIC} PRIVATE ${ARG_PRIVATE})
   tessera_compile_options(${name})
-  if(ARG_HEADERS)
-    target_precompile_headers(${name} PRIVATE ${ARG_HEADERS})
-  else()
+  if(NOT ARG_HEADERS)
     target_precompile_headers(${name} REUSE_FROM tessera_btf_headers)
+  elseif(NOT CMAKE_UNITY_BUILD)
+    target_precompile_headers(${name} PRIVATE ${ARG_HEADERS})
   endif()
 endfunction()
 

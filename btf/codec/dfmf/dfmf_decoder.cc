@@ -8,10 +8,10 @@
 #include <utility>
 
 #include <absl/strings/str_cat.h>
-#include <absl/strings/str_join.h>
 
 #include "btf/base/status_macros.h"
 #include "btf/codec/light_harmonics.h"
+#include "btf/codec/table_checks.h"
 #include "btf/math/max_theta.h"
 #include "btf/math/spherical_harmonics.h"
 
@@ -19,28 +19,6 @@ namespace tessera {
 namespace {
 
 using FactorMatrix = Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
-
-// The table, of the given shape; -1 stands for any extent of at least 1.
-absl::StatusOr<const CodecTable*> FindTable(const BtfelTable& table, const std::string& name,
-                                            std::vector<int64_t> shape) {
-  const auto found = table.tables.find(name);
-  if (found == table.tables.end()) {
-    return absl::InvalidArgumentError(absl::StrCat("codec table '", name, "' is missing"));
-  }
-  const CodecTable& values = found->second;
-  bool fits = values.shape.size() == shape.size();
-  size_t size = 1;
-  for (size_t i = 0; fits && i < shape.size(); ++i) {
-    fits = shape[i] >= 0 ? values.shape[i] == shape[i] : values.shape[i] >= 1;
-    fits = fits && !__builtin_mul_overflow(size, static_cast<size_t>(values.shape[i]), &size);
-  }
-  if (!fits || values.values.size() != size) {
-    return absl::InvalidArgumentError(absl::StrCat("codec table '", name, "': ", values.values.size(),
-                                                   " values of shape [", absl::StrJoin(values.shape, ", "),
-                                                   "], expected [", absl::StrJoin(shape, ", "), "]"));
-  }
-  return &values;
-}
 
 absl::StatusOr<double> FindNumber(const nlohmann::json& parameters, const std::string& name) {
   const auto found = parameters.find(name);
@@ -72,20 +50,7 @@ double LightScale(double z, double max_theta_rad) {
 absl::StatusOr<DfmfDecoder::Side> DfmfDecoder::MakeSide(const std::vector<Direction>& directions,
                                                         const std::string& name,
                                                         const nlohmann::json& parameters) {
-  if (directions.empty() || std::cmp_greater(directions.size(), kMaxDfmfDirections)) {
-    return absl::InvalidArgumentError(
-        absl::StrCat(name, "s: ", directions.size(), " directions, expected 1 to ", kMaxDfmfDirections));
-  }
-  for (size_t i = 0; i < directions.size(); ++i) {
-    // Directions that were stored as float32 may lie a rounding below the horizon.
-    constexpr double kTolerance = 1e-4;
-    if (!std::isfinite(directions[i].phi_rad) ||
-        !(directions[i].theta_rad >= 0.0 && directions[i].theta_rad <= kPi / 2.0 + kTolerance)) {
-      return absl::InvalidArgumentError(absl::StrCat(name, "s[", i, "]: polar angle ",
-                                                     DegFromRad(directions[i].theta_rad),
-                                                     " degrees, expected 0 to 90"));
-    }
-  }
+  TESSERA_RETURN_IF_ERROR(CheckDirections(directions, name + "s", kMaxDfmfDirections));
   const double max_theta_rad = MaxThetaRad(directions);
   TESSERA_ASSIGN_OR_RETURN(const int nodes,
                            FindInteger(parameters, name + "_nodes", 3, kMaxGridNodesPerSide));

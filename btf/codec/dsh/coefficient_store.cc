@@ -2,21 +2,17 @@
 
 #include <cstdlib>
 
-#include <sys/mman.h>
-
+#include "btf/base/huge_pages.h"
 #include "btf/base/status_macros.h"
 
 namespace tessera {
 namespace {
 
-// In huge pages where the system grants them: faulting in 4 KiB at a time costs more than the values'
-// computation.
 std::unique_ptr<float[], FreeDeleter> Allocate(uint64_t count) {
-  constexpr size_t kHugePageBytes = size_t{2} << 20;
   const size_t bytes = (count * sizeof(float) + kHugePageBytes - 1) / kHugePageBytes * kHugePageBytes;
   void* const memory = std::aligned_alloc(kHugePageBytes, bytes);
   if (memory != nullptr) {
-    madvise(memory, bytes, MADV_HUGEPAGE);
+    AdviseHugePages(memory, bytes);
   }
   return std::unique_ptr<float[], FreeDeleter>(static_cast<float*>(memory));
 }

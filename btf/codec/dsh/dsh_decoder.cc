@@ -11,6 +11,7 @@
 
 #include "btf/base/status_macros.h"
 #include "btf/codec/light_harmonics.h"
+#include "btf/codec/table_checks.h"
 #include "btf/math/max_theta.h"
 #include "btf/math/spherical_harmonics.h"
 
@@ -39,23 +40,6 @@ absl::StatusOr<Eigen::MatrixXd> Basis(const BtfelTable& table, const std::string
   return Eigen::Map<const Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>>(
              values.values.data(), n, n)
       .cast<double>();
-}
-
-absl::Status CheckDirections(const std::vector<Direction>& directions, const char* name) {
-  if (directions.empty()) {
-    return absl::InvalidArgumentError(absl::StrCat(name, ": there are none"));
-  }
-  for (size_t i = 0; i < directions.size(); ++i) {
-    // Directions that were stored as float32 may lie a rounding below the horizon.
-    constexpr double kTolerance = 1e-4;
-    if (!std::isfinite(directions[i].phi_rad) ||
-        !(directions[i].theta_rad >= 0.0 && directions[i].theta_rad <= kPi / 2.0 + kTolerance)) {
-      return absl::InvalidArgumentError(absl::StrCat(name, "[", i, "]: polar angle ",
-                                                     DegFromRad(directions[i].theta_rad),
-                                                     " degrees, expected 0 to 90"));
-    }
-  }
-  return absl::OkStatus();
 }
 
 }  // namespace

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <atomic>
 #include <cmath>
+#include <functional>
 #include <limits>
 #include <memory>
 #include <mutex>
@@ -218,53 +219,117 @@ absl::StatusOr<Material> EncodeWith(const Model& model, BtfSource& source, const
   return material;
 }
 
-// Samples of texels that a ridge is chosen by, as signals over the lights: [lights][(texel, channel, view)].
-// Texels are spread evenly over up to kRidgeRows rows, up to kRidgeTexels of each; those with illegal samples
-// are left out, for the encoder to name.
-absl::StatusOr<Eigen::MatrixXd> RidgeSamples(BtfSource& source, const RunContext& context) {
+// The texels that ridges are chosen by, spread evenly over up to kRidgeRows rows, up to kRidgeTexels of each.
+struct RidgeTexels {
+  int64_t count = 0;
+  Eigen::Index num_lights = 0;
+  Eigen::Index num_signals = 0;      // of one texel: (channel, view)
+  std::unique_ptr<float[]> samples;  // [texel][channel][view][light]
+
+  // As signals over the lights, [lights][(channel, view)].
+  [[nodiscard]] Eigen::MatrixXd LightSignals(int64_t texel) const {
+    return Eigen::Map<const Eigen::MatrixXf>(samples.get() + texel * num_lights * num_signals, num_lights,
+                                             num_signals)
+        .cast<double>();
+  }
+};
+
+absl::StatusOr<RidgeTexels> ReadRidgeTexels(BtfSource& source, const RunContext& context) {
   constexpr int kRidgeRows = 8;
   constexpr int kRidgeTexels = 32;
   const BtfInfo& info = source.info();
   const int num_rows = std::min(kRidgeRows, info.height);
-  const int num_texels = std::min(kRidgeTexels, info.width);
-  const Eigen::Index num_lights = static_cast<Eigen::Index>(info.lights.size());
-  const Eigen::Index signals_per_texel = static_cast<Eigen::Index>(3 * info.views.size());
-  const auto spread = [](int i, int count, int extent) {
-    return static_cast<int>((2 * int64_t{i} + 1) * extent / (2 * int64_t{count}));
+  const int texels_per_row = std::min(kRidgeTexels, info.width);
+  const auto spread = [](int64_t i, int64_t count, int64_t extent) {
+    return (2 * i + 1) * extent / (2 * count);
   };
   RunContext source_context = context;
   source_context.progress = nullptr;
-  Eigen::MatrixXd signals(num_lights, signals_per_texel * num_rows * num_texels);
-  Eigen::Index num_signals = 0;
-  auto row = std::make_unique_for_overwrite<float[]>(source.SamplesPerRow());
+  RidgeTexels texels{.count = int64_t{num_rows} * texels_per_row,
+                     .num_lights = static_cast<Eigen::Index>(info.lights.size()),
+                     .num_signals = static_cast<Eigen::Index>(3 * info.views.size())};
+  const size_t samples_per_texel = static_cast<size_t>(texels.num_lights * texels.num_signals);
+  // Not zeroed, they are filled.
+  texels.samples = std::make_unique_for_overwrite<float[]>(samples_per_texel * texels.count);
+  const auto row_buffer = std::make_unique_for_overwrite<float[]>(source.SamplesPerRow());
+  const std::span<float> row(row_buffer.get(), source.SamplesPerRow());
   for (int y = 0; y < num_rows; ++y) {
     TESSERA_RETURN_IF_ERROR(context.CheckStop());
-    TESSERA_RETURN_IF_ERROR(source.ReadRows(spread(y, num_rows, info.height), 1,
-                                            std::span(row.get(), source.SamplesPerRow()), source_context));
-    for (int x = 0; x < num_texels; ++x) {
-      const Eigen::Map<const Eigen::MatrixXf> texel(
-          row.get() + spread(x, num_texels, info.width) * signals_per_texel * num_lights, num_lights,
-          signals_per_texel);
-      if (std::all_of(texel.data(), texel.data() + texel.size(), IsLegalSample)) {
-        signals.middleCols(num_signals, signals_per_texel) = texel.cast<double>();
-        num_signals += signals_per_texel;
+    const int source_row = static_cast<int>(spread(y, num_rows, info.height));
+    TESSERA_RETURN_IF_ERROR(source.ReadRows(source_row, 1, row, source_context));
+    std::atomic<bool> is_legal = true;
+    ParallelFor(context, 0, texels_per_row, /*grain=*/4, [&](int64_t begin, int64_t end) {
+      for (int64_t x = begin; x < end; ++x) {
+        const std::span<const float> texel =
+            row.subspan(spread(x, texels_per_row, info.width) * samples_per_texel, samples_per_texel);
+        if (!std::ranges::all_of(texel, IsLegalSample)) {
+          is_legal = false;
+        }
+        std::ranges::copy(texel,
+                          texels.samples.get() + (int64_t{y} * texels_per_row + x) * samples_per_texel);
       }
+    });
+    if (!is_legal) {
+      return IllegalSampleError(info, source_row, row);
     }
   }
-  signals.conservativeResize(Eigen::NoChange, num_signals);
+  TESSERA_RETURN_IF_ERROR(context.CheckStop());
+  return texels;
+}
+
+// The sum over all texels of `signals_of(texel)`, in their order.
+absl::StatusOr<SignalEnergies> SumEnergies(const RidgeRegression& regression, int64_t num_texels,
+                                           const std::function<Eigen::MatrixXd(int64_t texel)>& signals_of,
+                                           const RunContext& context) {
+  std::vector<SignalEnergies> energies(static_cast<size_t>(num_texels));
+  ParallelFor(context, 0, num_texels, /*grain=*/8, [&](int64_t begin, int64_t end) {
+    for (int64_t texel = begin; texel < end; ++texel) {
+      energies[static_cast<size_t>(texel)] = regression.Energies(signals_of(texel));
+    }
+  });
+  TESSERA_RETURN_IF_ERROR(context.CheckStop());
+  SignalEnergies sum = std::move(energies.front());
+  for (size_t texel = 1; texel < energies.size(); ++texel) {
+    sum.projected += energies[texel].projected;
+    sum.total += energies[texel].total;
+  }
+  return sum;
+}
+
+// Light coefficients of one texel, [kl][(channel, view)], as signals over the views, [views][(channel, i)].
+Eigen::MatrixXd ViewSignals(const Eigen::MatrixXd& light_coefficients) {
+  const Eigen::Index kl = light_coefficients.rows();
+  const Eigen::Index num_views = light_coefficients.cols() / 3;
+  Eigen::MatrixXd signals(num_views, 3 * kl);
+  for (Eigen::Index channel = 0; channel < 3; ++channel) {
+    signals.middleCols(channel * kl, kl) =
+        light_coefficients.middleCols(channel * num_views, num_views).transpose();
+  }
   return signals;
 }
 
-// Light coefficients [kl][(texel, channel, view)] as signals over the views, [views][(texel, channel, i)].
-Eigen::MatrixXd ViewSignals(const Eigen::MatrixXd& light_coefficients, Eigen::Index num_views) {
-  const Eigen::Index kl = light_coefficients.rows();
-  const Eigen::Index num_blocks = light_coefficients.cols() / num_views;
-  Eigen::MatrixXd signals(num_views, num_blocks * kl);
-  for (Eigen::Index block = 0; block < num_blocks; ++block) {
-    signals.middleCols(block * kl, kl) =
-        light_coefficients.middleCols(block * num_views, num_views).transpose();
-  }
-  return signals;
+struct Ridges {
+  double light = 0.0;
+  double view = 0.0;
+};
+
+absl::StatusOr<Ridges> ChooseRidges(const RidgeRegression& light, const RidgeRegression& view,
+                                    BtfSource& source, const RunContext& context) {
+  TESSERA_ASSIGN_OR_RETURN(const RidgeTexels texels, ReadRidgeTexels(source, context));
+  TESSERA_ASSIGN_OR_RETURN(
+      const SignalEnergies light_energies,
+      SumEnergies(
+          light, texels.count, [&](int64_t texel) { return texels.LightSignals(texel); }, context));
+  Ridges ridges;
+  ridges.light = light.ChooseRidge(light_energies, kDshMaxRidge);
+  const Eigen::MatrixXd light_fit = light.Fit(ridges.light);
+  TESSERA_ASSIGN_OR_RETURN(
+      const SignalEnergies view_energies,
+      SumEnergies(
+          view, texels.count,
+          [&](int64_t texel) { return ViewSignals(light_fit * texels.LightSignals(texel)); }, context));
+  ridges.view = view.ChooseRidge(view_energies, kDshMaxRidge);
+  return ridges;
 }
 
 }  // namespace
@@ -306,19 +371,15 @@ absl::StatusOr<Material> EncodeDsh(BtfSource& source, const EncodeParams& params
                               DshPenalty(basis_light));
   const RidgeRegression view(DshSamplesOfBasis(info.views, params.kv) * basis_view.transpose(),
                              DshPenalty(basis_view));
-  TESSERA_ASSIGN_OR_RETURN(const Eigen::MatrixXd samples, RidgeSamples(source, context));
-  const double light_ridge = light.ChooseRidge(samples, kDshMaxRidge);
-  const Eigen::MatrixXd light_fit = light.Fit(light_ridge);
-  const double view_ridge = view.ChooseRidge(
-      ViewSignals(light_fit * samples, static_cast<Eigen::Index>(info.views.size())), kDshMaxRidge);
+  TESSERA_ASSIGN_OR_RETURN(const Ridges ridges, ChooseRidges(light, view, source, context));
   return EncodeWith({.codec_id = "dsh",
-                     .fitter = MakeLinearFitter(light_fit, view.Fit(view_ridge)),
+                     .fitter = MakeLinearFitter(light.Fit(ridges.light), view.Fit(ridges.view)),
                      .basis_light = std::move(basis_light),
                      .basis_view = std::move(basis_view),
                      .parameters = {{"kl", params.kl},
                                     {"kv", params.kv},
-                                    {"ridge_light", light_ridge},
-                                    {"ridge_view", view_ridge}}},
+                                    {"ridge_light", ridges.light},
+                                    {"ridge_view", ridges.view}}},
                     source, params, context);
 }
 

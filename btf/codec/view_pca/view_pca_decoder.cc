@@ -8,57 +8,18 @@
 #include <utility>
 
 #include <absl/strings/str_cat.h>
-#include <absl/strings/str_join.h>
 
 #include "btf/base/status_macros.h"
 #include "btf/codec/light_harmonics.h"
+#include "btf/codec/table_checks.h"
 #include "btf/math/spherical_harmonics.h"
 
 namespace tessera {
 namespace {
 
-absl::StatusOr<const CodecTable*> TableOf(const BtfelTable& table, const std::string& name,
-                                          const std::vector<int64_t>& shape, const char* expected) {
-  const auto found = table.tables.find(name);
-  if (found == table.tables.end()) {
-    return absl::InvalidArgumentError(absl::StrCat("codec table '", name, "' is missing"));
-  }
-  const CodecTable& values = found->second;
-  bool fits = values.shape.size() == shape.size();
-  size_t count = 1;
-  for (size_t i = 0; fits && i < shape.size(); ++i) {
-    fits = shape[i] < 0 ? values.shape[i] >= 1 : values.shape[i] == shape[i];
-    count *= static_cast<size_t>(values.shape[i]);
-  }
-  if (!fits || values.values.size() != count) {
-    return absl::InvalidArgumentError(absl::StrCat("codec table '", name, "': shape [",
-                                                   absl::StrJoin(values.shape, ", "), "] with ",
-                                                   values.values.size(), " values, expected ", expected));
-  }
-  return &values;
-}
-
-absl::Status CheckDirections(const std::vector<Direction>& directions, const char* name) {
-  if (directions.empty() || directions.size() > kMaxViewPcaDirections) {
-    return absl::InvalidArgumentError(
-        absl::StrCat(name, ": there are ", directions.size(), ", expected 1 to ", kMaxViewPcaDirections));
-  }
-  for (size_t i = 0; i < directions.size(); ++i) {
-    // Directions that were stored as float32 may lie a rounding below the horizon.
-    constexpr double kTolerance = 1e-4;
-    if (!std::isfinite(directions[i].phi_rad) ||
-        !(directions[i].theta_rad >= 0.0 && directions[i].theta_rad <= kPi / 2.0 + kTolerance)) {
-      return absl::InvalidArgumentError(absl::StrCat(name, "[", i, "]: polar angle ",
-                                                     DegFromRad(directions[i].theta_rad),
-                                                     " degrees, expected 0 to 90"));
-    }
-  }
-  return absl::OkStatus();
-}
-
 absl::StatusOr<HemisphereInterpolator> Interpolator(const BtfelTable& table, const std::string& name,
                                                     const std::vector<Direction>& directions) {
-  TESSERA_ASSIGN_OR_RETURN(const CodecTable* values, TableOf(table, name, {-1, 3}, "[triangles][3]"));
+  TESSERA_ASSIGN_OR_RETURN(const CodecTable* values, FindTable(table, name, {-1, 3}));
   // A Delaunay triangulation has fewer.
   const size_t limit = 2 * directions.size();
   if (values->values.size() / 3 > limit) {
@@ -82,8 +43,8 @@ absl::StatusOr<HemisphereInterpolator> Interpolator(const BtfelTable& table, con
 }  // namespace
 
 absl::StatusOr<std::unique_ptr<ViewPcaDecoder>> ViewPcaDecoder::Create(const BtfelTable& table) {
-  TESSERA_RETURN_IF_ERROR(CheckDirections(table.lights, "lights"));
-  TESSERA_RETURN_IF_ERROR(CheckDirections(table.views, "views"));
+  TESSERA_RETURN_IF_ERROR(CheckDirections(table.lights, "lights", kMaxViewPcaDirections));
+  TESSERA_RETURN_IF_ERROR(CheckDirections(table.views, "views", kMaxViewPcaDirections));
   const auto recorded = table.parameters.find("eigen_textures");
   if (recorded == table.parameters.end() || !recorded->is_number_integer() || recorded->get<int64_t>() < 0 ||
       recorded->get<int64_t>() > kMaxEigenTextures) {
@@ -101,9 +62,8 @@ absl::StatusOr<std::unique_ptr<ViewPcaDecoder>> ViewPcaDecoder::Create(const Btf
                                                    " steps, expected ", expected, " = 3 * (eigen_textures ",
                                                    c, " + 1) * ", num_views, " views"));
   }
-  TESSERA_ASSIGN_OR_RETURN(
-      const CodecTable* codes,
-      TableOf(table, "light_weights", {num_views, num_lights, c}, "[views][lights][eigen_textures]"));
+  TESSERA_ASSIGN_OR_RETURN(const CodecTable* codes,
+                           FindTable(table, "light_weights", {num_views, num_lights, c}));
   std::vector<float> weights;
   weights.reserve(codes->values.size());
   for (const float code : codes->values) {

@@ -13,8 +13,6 @@
 namespace tessera {
 namespace {
 
-constexpr char kWool[] = "btf/ubo2003_wool128/UBO_WOOL128_decoded.zip";
-
 std::unique_ptr<BtfSource> Wool() {
   ImportOptions options;
   options.transfer = *ParseTransfer("gamma:2.2");

@@ -12,21 +12,13 @@
 #include "btf/codec/material.h"
 #include "btf/data/direction_sets.h"
 #include "tests/btf/codec/synthetic_btf.h"
+#include "tests/support/codecs.h"
+#include "tests/support/status.h"
 
 namespace tessera {
 namespace {
 
 using ::testing::HasSubstr;
-
-absl::StatusOr<Material> Encode(BtfSource& source, const EncodeParams& params, int threads = 2) {
-  RunContext context;
-  context.num_threads = threads;
-  return FindCodec("dfmf")->Encode(source, params, context);
-}
-
-std::string Message(const absl::Status& status) {
-  return std::string(status.message());
-}
 
 SampledBtf Shiny(int width, int height, uint64_t seed = 1) {
   return ShinyBtf(width, height, RingDirections(4, 9), RingDirections(4, 8), seed);
@@ -80,7 +72,7 @@ TEST(DfmfEncodeTest, ErrorFallsWithRankTowardsTheBest) {
   SampledBtf btf = Shiny(12, 10);
   double previous = 1.0;
   for (const int rank : {1, 3, 8, 24}) {
-    const auto material = Encode(btf, {.rank = rank});
+    const auto material = Encode("dfmf", btf, {.rank = rank});
     ASSERT_TRUE(material.ok()) << material.status();
     EXPECT_EQ(material->btfels.num_coefficients, rank);
     const double rmse = Rmse(btf, *material);
@@ -111,7 +103,7 @@ TEST(DfmfEncodeTest, RanksAtAndBeyondTheNumericalOne) {
     }
   }
   for (const int rank : {3, 4, 40, 200}) {
-    const auto material = Encode(btf, {.rank = rank});
+    const auto material = Encode("dfmf", btf, {.rank = rank});
     ASSERT_TRUE(material.ok()) << material.status();
     EXPECT_EQ(material->btfels.num_coefficients, 3) << rank;
     EXPECT_LT(Rmse(btf, *material), kStorageError);
@@ -122,14 +114,14 @@ TEST(DfmfEncodeTest, MeetsAnErrorBound) {
   SampledBtf btf = Shiny(12, 10);
   size_t previous = 0;
   for (const double bound : {0.05, 0.02, 0.01}) {
-    const auto material = Encode(btf, {.max_error = bound});
+    const auto material = Encode("dfmf", btf, {.max_error = bound});
     ASSERT_TRUE(material.ok()) << material.status();
     EXPECT_LE(Rmse(btf, *material), bound);
     const size_t bytes = SerializeMaterial(*material)->size();
     EXPECT_GT(bytes, previous);
     previous = bytes;
   }
-  const auto material = Encode(btf, {.max_error = 1e-9});
+  const auto material = Encode("dfmf", btf, {.max_error = 1e-9});
   EXPECT_EQ(material.status().code(), absl::StatusCode::kFailedPrecondition);
   EXPECT_THAT(Message(material.status()), HasSubstr("RMSE of"));
 }
@@ -138,7 +130,7 @@ TEST(DfmfEncodeTest, FitsIntoBytes) {
   SampledBtf btf = Shiny(24, 20);
   double previous = 1.0;
   for (const uint64_t bound : {20'000, 40'000, 80'000}) {
-    const auto material = Encode(btf, {.max_bytes = bound});
+    const auto material = Encode("dfmf", btf, {.max_bytes = bound});
     ASSERT_TRUE(material.ok()) << material.status();
     const size_t bytes = SerializeMaterial(*material)->size();
     EXPECT_LE(bytes, bound);
@@ -147,32 +139,32 @@ TEST(DfmfEncodeTest, FitsIntoBytes) {
     EXPECT_LT(rmse, previous);
     previous = rmse;
   }
-  const auto material = Encode(btf, {.max_bytes = 1000});
+  const auto material = Encode("dfmf", btf, {.max_bytes = 1000});
   EXPECT_EQ(material.status().code(), absl::StatusCode::kFailedPrecondition);
   EXPECT_THAT(Message(material.status()), HasSubstr("max_bytes = 1000"));
 }
 
 TEST(DfmfEncodeTest, AnyNumberOfThreadsGivesTheSameBytes) {
   SampledBtf btf = Shiny(21, 9);
-  const std::string one = *SerializeMaterial(*Encode(btf, {.rank = 12}, 1));
+  const std::string one = *SerializeMaterial(*Encode("dfmf", btf, {.rank = 12}, 1));
   for (const int threads : {2, 8}) {
-    EXPECT_EQ(*SerializeMaterial(*Encode(btf, {.rank = 12}, threads)), one) << threads;
+    EXPECT_EQ(*SerializeMaterial(*Encode("dfmf", btf, {.rank = 12}, threads)), one) << threads;
   }
 }
 
 TEST(DfmfEncodeTest, HonoursTheBudget) {
   SampledBtf btf = Shiny(16, 16);
-  const auto roomy = Encode(btf, {.rank = 10});
+  const auto roomy = Encode("dfmf", btf, {.rank = 10});
   ASSERT_TRUE(roomy.ok());
   EXPECT_EQ(btf.largest_request(), 16);
   SampledBtf again = Shiny(16, 16);
   const uint64_t row_bytes = again.SamplesPerRow() * sizeof(float);
-  const auto tight = Encode(again, {.rank = 10, .memory_budget_bytes = 8 * row_bytes});
+  const auto tight = Encode("dfmf", again, {.rank = 10, .memory_budget_bytes = 8 * row_bytes});
   ASSERT_TRUE(tight.ok()) << tight.status();
   EXPECT_EQ(again.largest_request(), 2);  // a quarter
   EXPECT_EQ(*SerializeMaterial(*tight), *SerializeMaterial(*roomy));
   SampledBtf least = Shiny(16, 16);
-  const auto spilled = Encode(least, {.rank = 10, .memory_budget_bytes = 1});
+  const auto spilled = Encode("dfmf", least, {.rank = 10, .memory_budget_bytes = 1});
   ASSERT_TRUE(spilled.ok()) << spilled.status();
   EXPECT_EQ(least.largest_request(), 1);
   EXPECT_EQ(*SerializeMaterial(*spilled), *SerializeMaterial(*roomy));
@@ -204,7 +196,7 @@ TEST(DfmfEncodeTest, DegenerateTexturesAndSets) {
         }
       }
     }
-    const auto material = Encode(btf, {.rank = 12});
+    const auto material = Encode("dfmf", btf, {.rank = 12});
     ASSERT_TRUE(material.ok()) << c.name << ": " << material.status();
     // What the nugget takes from eleven directions.
     EXPECT_LE(Rmse(btf, *material), 0.02) << c.name;
@@ -229,19 +221,19 @@ TEST(DfmfEncodeTest, RefusesWhatItCannotEncode) {
        {std::numeric_limits<float>::quiet_NaN(), std::numeric_limits<float>::infinity(), 1e13F}) {
     SampledBtf btf = Shiny(5, 4);
     btf.at(3, 2, 1, 7, 5) = bad;
-    const absl::Status status = Encode(btf, {.rank = 2}).status();
+    const absl::Status status = Encode("dfmf", btf, {.rank = 2}).status();
     EXPECT_EQ(status.code(), absl::StatusCode::kInvalidArgument);
     EXPECT_THAT(Message(status), HasSubstr("view 7, light 5, texel (3, 2), channel 1"));
   }
   SampledBtf btf = Shiny(2, 2);
-  EXPECT_THAT(Message(Encode(btf, {.rank = -1}).status()), HasSubstr("rank = -1"));
-  EXPECT_THAT(Message(Encode(btf, {.rank = 5000}).status()), HasSubstr("rank = 5000"));
-  EXPECT_THAT(Message(Encode(btf, {.max_error = -0.5}).status()), HasSubstr("max_error"));
-  EXPECT_THAT(Message(Encode(btf, {.rank = 3, .max_bytes = 100}).status()), HasSubstr("at most one"));
+  EXPECT_THAT(Message(Encode("dfmf", btf, {.rank = -1}).status()), HasSubstr("rank = -1"));
+  EXPECT_THAT(Message(Encode("dfmf", btf, {.rank = 5000}).status()), HasSubstr("rank = 5000"));
+  EXPECT_THAT(Message(Encode("dfmf", btf, {.max_error = -0.5}).status()), HasSubstr("max_error"));
+  EXPECT_THAT(Message(Encode("dfmf", btf, {.rank = 3, .max_bytes = 100}).status()), HasSubstr("at most one"));
   SampledBtf below(1, 1, {{1.7, 0.0}}, {{0.0, 0.0}});
-  EXPECT_THAT(Message(Encode(below, {.rank = 1}).status()), HasSubstr("views[0]"));
+  EXPECT_THAT(Message(Encode("dfmf", below, {.rank = 1}).status()), HasSubstr("views[0]"));
   SampledBtf none(1, 1, {{0.0, 0.0}}, {});
-  EXPECT_THAT(Message(Encode(none, {.rank = 1}).status()), HasSubstr("no lights"));
+  EXPECT_THAT(Message(Encode("dfmf", none, {.rank = 1}).status()), HasSubstr("no lights"));
 }
 
 TEST(DfmfEncodeTest, StopsWhenAsked) {
@@ -266,7 +258,7 @@ TEST(DfmfEncodeTest, StopsWhenAsked) {
 
 BtfelTable ShinyTable(int rank = 10) {
   SampledBtf btf = Shiny(4, 4, 7);
-  return Encode(btf, {.rank = rank})->btfels;
+  return Encode("dfmf", btf, {.rank = rank})->btfels;
 }
 
 TEST(DfmfDecoderTest, NeverExtrapolates) {
@@ -334,7 +326,7 @@ TEST(DfmfDecoderTest, ATurnIsATurnOfBothDirections) {
 
 TEST(DfmfMaterialTest, ComesBackFromTheContainer) {
   SampledBtf btf = Shiny(6, 5);
-  const auto material = Encode(btf, {.rank = 9});
+  const auto material = Encode("dfmf", btf, {.rank = 9});
   ASSERT_TRUE(material.ok());
   const auto bytes = SerializeMaterial(*material);
   ASSERT_TRUE(bytes.ok()) << bytes.status();

@@ -16,7 +16,6 @@
 namespace tessera {
 namespace {
 
-constexpr char kWool[] = "btf/ubo2003_wool128/UBO_WOOL128_decoded.zip";
 constexpr int kCoefficients = 25;
 constexpr uint64_t kDshBytes = uint64_t{128} * 128 * 3 * kCoefficients * kCoefficients;
 constexpr int kRowStep = 4;

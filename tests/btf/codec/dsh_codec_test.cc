@@ -15,25 +15,13 @@
 #include "btf/codec/quantize.h"
 #include "btf/math/spherical_harmonics.h"
 #include "tests/btf/codec/synthetic_btf.h"
+#include "tests/support/codecs.h"
+#include "tests/support/status.h"
 
 namespace tessera {
 namespace {
 
 using ::testing::HasSubstr;
-
-RunContext Threads(int count) {
-  RunContext context;
-  context.num_threads = count;
-  return context;
-}
-
-absl::StatusOr<Material> Encode(BtfSource& source, const EncodeParams& params, int threads = 2) {
-  return FindCodec("dsh-cls")->Encode(source, params, Threads(threads));
-}
-
-std::string Message(const absl::Status& status) {
-  return std::string(status.message());
-}
 
 // The paper's method for one signal: the smallest lambda by bisection, one factorisation a step; lambda no
 // smaller than the encoder's floor.
@@ -70,7 +58,7 @@ TEST(DshEncodeTest, EqualsTheTwoPassesDoneSlowly) {
   SampledBtf btf = ShinyBtf(3, 2, RingDirections(4, 7), RingDirections(5, 8));
   for (const ClsEnergy energy : {ClsEnergy::kHemisphere, ClsEnergy::kSphere}) {
     const EncodeParams params{.kl = 16, .kv = 9, .cls_energy = energy};
-    const auto material = Encode(btf, params);
+    const auto material = Encode("dsh-cls", btf, params);
     ASSERT_TRUE(material.ok()) << material.status();
     const auto decoder = MakeDecoder(material->btfels);
     ASSERT_TRUE(decoder.ok()) << decoder.status();
@@ -125,7 +113,7 @@ TEST(DshEncodeTest, ReproducesASmoothBtf) {
       }
     }
   }
-  const auto material = Encode(btf, {.kl = 9, .kv = 9, .cls_energy = ClsEnergy::kSphere});
+  const auto material = Encode("dsh-cls", btf, {.kl = 9, .kv = 9, .cls_energy = ClsEnergy::kSphere});
   ASSERT_TRUE(material.ok()) << material.status();
   const auto decoder = MakeDecoder(material->btfels);
   ASSERT_TRUE(decoder.ok());
@@ -140,30 +128,31 @@ TEST(DshEncodeTest, ReproducesASmoothBtf) {
 TEST(DshEncodeTest, DependsNeitherOnThreadsNorOnTheBudget) {
   SampledBtf btf = ShinyBtf(13, 9, RingDirections(3, 5), RingDirections(3, 6));
   const EncodeParams params{.kl = 9, .kv = 4};
-  const auto reference = Encode(btf, params, 1);
+  const auto reference = Encode("dsh-cls", btf, params, 1);
   ASSERT_TRUE(reference.ok());
   const std::string bytes = *SerializeMaterial(*reference);
   for (const int threads : {2, 8}) {
-    EXPECT_EQ(*SerializeMaterial(*Encode(btf, params, threads)), bytes) << threads << " threads";
+    EXPECT_EQ(*SerializeMaterial(*Encode("dsh-cls", btf, params, threads)), bytes) << threads << " threads";
   }
   // 9 rows of 13 x 108 floats are 50 kB: this budget spills, and holds two rows of samples.
   EncodeParams small = params;
   small.memory_budget_bytes = 2 * (btf.SamplesPerRow() + 13 * 108) * sizeof(float);
-  const auto spilled = Encode(btf, small, 2);
+  const auto spilled = Encode("dsh-cls", btf, small, 2);
   ASSERT_TRUE(spilled.ok()) << spilled.status();
   EXPECT_EQ(*SerializeMaterial(*spilled), bytes);
   SampledBtf again = ShinyBtf(13, 9, RingDirections(3, 5), RingDirections(3, 6));
-  ASSERT_TRUE(Encode(again, small, 2).ok());
+  ASSERT_TRUE(Encode("dsh-cls", again, small, 2).ok());
   EXPECT_EQ(again.largest_request(), 2);
   small.memory_budget_bytes = 0;
-  EXPECT_EQ(*SerializeMaterial(*Encode(btf, small, 2)), bytes);
+  EXPECT_EQ(*SerializeMaterial(*Encode("dsh-cls", btf, small, 2)), bytes);
 }
 
 TEST(DshEncodeTest, NamesTheLegalCounts) {
   SampledBtf btf = ShinyBtf(1, 1, RingDirections(2, 3), RingDirections(2, 3));
   for (const int illegal : {0, -1, 24, 64}) {
-    EXPECT_THAT(Message(Encode(btf, {.kl = illegal}).status()), HasSubstr("1, 4, 9, 16, 25, 36 and 49"));
-    EXPECT_THAT(Message(Encode(btf, {.kv = illegal}).status()), HasSubstr("kv = "));
+    EXPECT_THAT(Message(Encode("dsh-cls", btf, {.kl = illegal}).status()),
+                HasSubstr("1, 4, 9, 16, 25, 36 and 49"));
+    EXPECT_THAT(Message(Encode("dsh-cls", btf, {.kv = illegal}).status()), HasSubstr("kv = "));
   }
 }
 
@@ -173,7 +162,7 @@ TEST(DshEncodeTest, NamesTheSampleThatIsNotFinite) {
     SampledBtf btf = ShinyBtf(6, 5, RingDirections(3, 5), RingDirections(3, 6));
     btf.at(5, 3, 1, 4, 9) = bad;
     btf.at(0, 4, 0, 0, 0) = bad;  // later
-    const auto material = Encode(btf, {.kl = 4, .kv = 4});
+    const auto material = Encode("dsh-cls", btf, {.kl = 4, .kv = 4});
     EXPECT_EQ(material.status().code(), absl::StatusCode::kInvalidArgument);
     EXPECT_THAT(Message(material.status()), HasSubstr("view 4, light 9, texel (5, 3), channel 1"));
   }
@@ -181,9 +170,9 @@ TEST(DshEncodeTest, NamesTheSampleThatIsNotFinite) {
 
 TEST(DshEncodeTest, RefusesDirectionsBelowTheSurface) {
   SampledBtf btf = ShinyBtf(1, 1, {{0.0, 0.0}, {RadFromDeg(91.0), 0.0}}, RingDirections(2, 3));
-  EXPECT_THAT(Message(Encode(btf, {.kl = 1, .kv = 1}).status()), HasSubstr("views[1]"));
+  EXPECT_THAT(Message(Encode("dsh-cls", btf, {.kl = 1, .kv = 1}).status()), HasSubstr("views[1]"));
   SampledBtf none = ShinyBtf(1, 1, RingDirections(2, 3), {});
-  EXPECT_THAT(Message(Encode(none, {.kl = 1, .kv = 1}).status()), HasSubstr("no lights"));
+  EXPECT_THAT(Message(Encode("dsh-cls", none, {.kl = 1, .kv = 1}).status()), HasSubstr("no lights"));
 }
 
 TEST(DshEncodeTest, DegenerateBtfsStayFinite) {
@@ -216,7 +205,7 @@ TEST(DshEncodeTest, DegenerateBtfsStayFinite) {
         }
       }
     }
-    const auto material = Encode(btf, {.kl = 25, .kv = 25, .cls_energy = ClsEnergy::kSphere});
+    const auto material = Encode("dsh-cls", btf, {.kl = 25, .kv = 25, .cls_energy = ClsEnergy::kSphere});
     ASSERT_TRUE(material.ok()) << c.name << ": " << material.status();
     const auto bytes = SerializeMaterial(*material);
     ASSERT_TRUE(bytes.ok()) << c.name << ": " << bytes.status();
@@ -230,9 +219,9 @@ TEST(DshEncodeTest, DegenerateBtfsStayFinite) {
     if (std::string(c.name) == "black") {
       EXPECT_EQ(rgb.maxCoeff(), 0.0);
     }
-    const auto small = Encode(btf, {.kl = 9, .kv = 9});
+    const auto small = Encode("dsh-cls", btf, {.kl = 9, .kv = 9});
     ASSERT_TRUE(small.ok()) << c.name << small.status();
-    const auto embedding = FindCodec("dsh-cls")->Embed(*small, 4, Threads(1));
+    const auto embedding = FindCodec("dsh-cls")->Embed(*small, 4, RunContext{});
     ASSERT_TRUE(embedding.ok()) << c.name << embedding.status();
     for (const float value : embedding->values) {
       ASSERT_TRUE(std::isfinite(value)) << c.name;
@@ -292,7 +281,7 @@ TEST(QuantizeTest, ErrorIsBoundedByHalfAStep) {
 // A table with random codes, the directions reaching 75 degrees.
 BtfelTable RandomTable(int kl, int kv) {
   SampledBtf btf = ShinyBtf(2, 2, RingDirections(4, 9), RingDirections(4, 9), 7);
-  return Encode(btf, {.kl = kl, .kv = kv})->btfels;
+  return Encode("dsh-cls", btf, {.kl = kl, .kv = kv})->btfels;
 }
 
 TEST(DshDecoderTest, IsTheDoubleSum) {

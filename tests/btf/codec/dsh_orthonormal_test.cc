@@ -18,7 +18,7 @@
 namespace tessera {
 namespace {
 
-Material Encode(std::string_view id, BtfSource& source, const EncodeParams& params) {
+Material Encoded(std::string_view id, BtfSource& source, const EncodeParams& params) {
   auto material = FindCodec(id)->Encode(source, params, {});
   EXPECT_TRUE(material.ok()) << material.status();
   return *std::move(material);
@@ -69,7 +69,7 @@ TEST(DshBasisTest, IsOrthonormalOverTheHemisphereAsDecoded) {
   for (const double max_theta_deg : {75.0, 90.0, 60.0}) {
     SampledBtf btf =
         ShinyBtf(2, 1, RingDirections(7, 12, max_theta_deg), RingDirections(6, 14, max_theta_deg));
-    const Material material = Encode("dsh", btf, {.kl = 25, .kv = 16});
+    const Material material = Encoded("dsh", btf, {.kl = 25, .kv = 16});
     const auto decoder = DshDecoder::Create(material.btfels);
     ASSERT_TRUE(decoder.ok()) << decoder.status();
     const Eigen::MatrixXd light =
@@ -145,7 +145,7 @@ TEST(DshBasisTest, ThePenaltyIsSizeAndRoughness) {
 
 TEST(DshOrthonormalTest, EqualsTheTwoPassesDoneSlowly) {
   SampledBtf btf = ShinyBtf(3, 2, RingDirections(4, 9), RingDirections(5, 9));
-  const Material material = Encode("dsh", btf, {.kl = 16, .kv = 9});
+  const Material material = Encoded("dsh", btf, {.kl = 16, .kv = 9});
   const BtfelTable& table = material.btfels;
   const auto decoder = *DshDecoder::Create(table);
   const auto samples = [](const std::vector<Direction>& directions, const Eigen::MatrixXd& basis) {
@@ -193,9 +193,9 @@ TEST(DshOrthonormalTest, BeatsTheOthersAtTheSameBytes) {
   SampledBtf btf = ShinyBtf(8, 8, RingDirections(6, 16), RingDirections(6, 16));
   for (const int k : {9, 25, 49}) {
     const EncodeParams params{.kl = k, .kv = k};
-    const Material dsh = Encode("dsh", btf, params);
-    const Material cls = Encode("dsh-cls", btf, params);
-    const Material ls = Encode("dsh-ls", btf, params);
+    const Material dsh = Encoded("dsh", btf, params);
+    const Material cls = Encoded("dsh-cls", btf, params);
+    const Material ls = Encoded("dsh-ls", btf, params);
     EXPECT_EQ(dsh.btfels.codes.size(), cls.btfels.codes.size());
     const double error = Rmse(btf, dsh);
     EXPECT_LT(error, 0.9 * Rmse(btf, cls)) << k;
@@ -207,7 +207,7 @@ TEST(DshOrthonormalTest, BeatsTheOthersAtTheSameBytes) {
 
 TEST(DshLeastSquaresTest, IsThePseudoInverseWithinASteps) {
   SampledBtf btf = ShinyBtf(2, 2, RingDirections(5, 12), RingDirections(5, 12));
-  const Material material = Encode("dsh-ls", btf, {.kl = 9, .kv = 9});
+  const Material material = Encoded("dsh-ls", btf, {.kl = 9, .kv = 9});
   const BtfelTable& table = material.btfels;
   Eigen::Matrix3Xd vectors(3, table.lights.size());
   for (size_t i = 0; i < table.lights.size(); ++i) {
@@ -260,7 +260,7 @@ TEST(DshFamilyTest, DegenerateBtfsStayFinite) {
           }
         }
       }
-      const Material material = Encode(id, btf, {.kl = 49, .kv = 25});
+      const Material material = Encoded(id, btf, {.kl = 49, .kv = 25});
       ASSERT_TRUE(SerializeMaterial(material).ok()) << id << ' ' << c.name;
       const double rmse = Rmse(btf, material);
       const double bound = std::string(id) == "dsh-ls"             ? std::numeric_limits<double>::infinity()
@@ -269,7 +269,7 @@ TEST(DshFamilyTest, DegenerateBtfsStayFinite) {
                                                                    : 0.05 * c.value;
       EXPECT_TRUE(std::isfinite(rmse)) << id << ' ' << c.name;
       EXPECT_LE(rmse, bound) << id << ' ' << c.name;
-      const auto embedding = FindCodec(id)->Embed(Encode(id, btf, {.kl = 9, .kv = 9}), 4, {});
+      const auto embedding = FindCodec(id)->Embed(Encoded(id, btf, {.kl = 9, .kv = 9}), 4, {});
       ASSERT_TRUE(embedding.ok()) << id << ' ' << c.name << embedding.status();
       for (const float value : embedding->values) {
         ASSERT_TRUE(std::isfinite(value)) << id << ' ' << c.name;

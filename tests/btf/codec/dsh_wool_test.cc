@@ -12,13 +12,11 @@
 namespace tessera {
 namespace {
 
-constexpr char kWool[] = "btf/ubo2003_wool128/UBO_WOOL128_decoded.zip";
-constexpr int kRowStep = 4;
-
 TEST(DshWoolTest, BeatsConstrainedLeastSquaresAtTheSameBytes) {
   TESSERA_REQUIRE_DATA(kWool);
   const auto source = ImportBtf(TestData(kWool), {.transfer = Transfer{TransferKind::kGamma, 2.2}}, {});
   ASSERT_TRUE(source.ok()) << source.status();
+  constexpr int kRowStep = 4;
   const SampledRows rows = ReadEveryRow(**source, kRowStep);
   const auto rmse = [&](const char* id, ClsEnergy energy) {
     const auto material = FindCodec(id)->Encode(**source, {.kl = 25, .kv = 25, .cls_energy = energy}, {});

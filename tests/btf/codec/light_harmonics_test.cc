@@ -11,20 +11,10 @@
 #include "btf/codec/decoder.h"
 #include "btf/math/spherical_harmonics.h"
 #include "tests/btf/codec/synthetic_btf.h"
+#include "tests/support/codecs.h"
 
 namespace tessera {
 namespace {
-
-Eigen::Array3d ValueOf(const LinearForm& form, const std::vector<double>& coefficients) {
-  Eigen::Array3d rgb = Eigen::Array3d::Zero();
-  const double* weight = form.weights.data();
-  for (const LinearForm::Run& run : form.runs) {
-    for (int i = run.first; i < run.first + run.count; ++i) {
-      rgb[run.channel] += *weight++ * coefficients[i];
-    }
-  }
-  return rgb;
-}
 
 double Environment(const std::vector<double>& harmonics, const Eigen::Vector3d& light) {
   Eigen::VectorXd y(static_cast<Eigen::Index>(harmonics.size()));
@@ -80,7 +70,7 @@ TEST_P(LightHarmonicsTest, IntegratesTheExtendedFunctionAgainstAnyEnvironment) {
         ASSERT_EQ(forms.size(), static_cast<size_t>(n));
         Eigen::Array3d value = Eigen::Array3d::Zero();
         for (int i = 0; i < n; ++i) {
-          value += environment[i] * ValueOf(forms[i], c);
+          value += environment[i] * forms[i].ValueOf(c);
         }
         const Eigen::Array3d slow = SlowIntegral(*decoder, c, eye, environment);
         EXPECT_LT((value - slow).abs().maxCoeff(), kTolerance)
@@ -110,7 +100,7 @@ TEST_P(LightHarmonicsTest, AConstantEnvironmentGivesTheHemisphereIntegral) {
   std::vector<double> c(material->btfels.num_coefficients);
   decoder->Dequantize(material->btfels.btfel(0), c);
   const LinearForm form = decoder->LightHarmonics(1, {0, 0, 1})[0];
-  const Eigen::Array3d value = std::sqrt(4.0 * kPi) * ValueOf(form, c);
+  const Eigen::Array3d value = std::sqrt(4.0 * kPi) * form.ValueOf(c);
   const double expected = 2.0 * kPi * (1.0 - 0.5 * std::cos(RadFromDeg(75.0)));
   // What the codecs themselves lose on a constant; "dsh-cls" is bound by its energy.
   const double tolerance = GetParam() == "dsh-cls" ? 0.1 : 0.02;
@@ -132,20 +122,7 @@ TEST_P(LightHarmonicsTest, FollowsTheFormatAtTheViewsHorizon) {
   }
 }
 
-std::vector<std::string> AllCodecs() {
-  std::vector<std::string> ids;
-  for (const std::string_view id : CodecIds()) {
-    ids.emplace_back(id);
-  }
-  return ids;
-}
-
-INSTANTIATE_TEST_SUITE_P(AllCodecs, LightHarmonicsTest, ::testing::ValuesIn(AllCodecs()),
-                         [](const auto& info) {
-                           std::string name = info.param;
-                           std::erase_if(name, [](char c) { return c == '-'; });
-                           return name;
-                         });
+INSTANTIATE_TEST_SUITE_P(AllCodecs, LightHarmonicsTest, ::testing::ValuesIn(AllCodecs()), CodecTestName);
 
 }  // namespace
 }  // namespace tessera

@@ -6,6 +6,7 @@
 
 #include "btf/codec/codec.h"
 #include "btf/data/direction_sets.h"
+#include "tests/support/codecs.h"
 #include "tests/support/noise_btf.h"
 
 namespace tessera {
@@ -39,19 +40,7 @@ TEST_P(OutOfCoreTest, SameBytesWithinATinyBudget) {
   EXPECT_TRUE(*bytes == *expected);
 }
 
-std::vector<std::string> AllCodecs() {
-  std::vector<std::string> ids;
-  for (const std::string_view id : CodecIds()) {
-    ids.emplace_back(id);
-  }
-  return ids;
-}
-
-INSTANTIATE_TEST_SUITE_P(AllCodecs, OutOfCoreTest, ::testing::ValuesIn(AllCodecs()), [](const auto& info) {
-  std::string name = info.param;
-  std::erase_if(name, [](char c) { return c == '-'; });
-  return name;
-});
+INSTANTIATE_TEST_SUITE_P(AllCodecs, OutOfCoreTest, ::testing::ValuesIn(AllCodecs()), CodecTestName);
 
 }  // namespace
 }  // namespace tessera

@@ -13,21 +13,13 @@
 #include "btf/codec/view_pca/overlap_error.h"
 #include "btf/codec/view_pca/view_pca_decoder.h"
 #include "tests/btf/codec/synthetic_btf.h"
+#include "tests/support/codecs.h"
+#include "tests/support/status.h"
 
 namespace tessera {
 namespace {
 
 using ::testing::HasSubstr;
-
-absl::StatusOr<Material> Encode(BtfSource& source, const EncodeParams& params, int threads = 2) {
-  RunContext context;
-  context.num_threads = threads;
-  return FindCodec("view-pca")->Encode(source, params, context);
-}
-
-std::string Message(const absl::Status& status) {
-  return std::string(status.message());
-}
 
 // Decoded at the sampled pair, unclamped.
 Eigen::Array3d DecodeSample(const Material& material, const Decoder& decoder, size_t texel, size_t view,
@@ -60,7 +52,7 @@ TEST(ViewPcaTest, EqualsPrincipalComponentsDoneByForce) {
   SampledBtf btf = ShinyBtf(7, 5, RingDirections(3, 5), RingDirections(4, 6));
   const size_t num_lights = btf.info().lights.size();
   constexpr int kComponents = 3;
-  const auto material = Encode(btf, {.eigen_textures = kComponents});
+  const auto material = Encode("view-pca", btf, {.eigen_textures = kComponents});
   ASSERT_TRUE(material.ok()) << material.status();
   const auto decoder = ViewPcaDecoder::Create(material->btfels);
   ASSERT_TRUE(decoder.ok()) << decoder.status();
@@ -92,7 +84,7 @@ TEST(ViewPcaTest, EqualsPrincipalComponentsDoneByForce) {
 
 TEST(ViewPcaTest, AllComponentsAreExactAtSampledDirections) {
   SampledBtf btf = ShinyBtf(5, 4, RingDirections(3, 6), RingDirections(3, 7));
-  const auto material = Encode(btf, {.eigen_textures = 15});
+  const auto material = Encode("view-pca", btf, {.eigen_textures = 15});
   ASSERT_TRUE(material.ok()) << material.status();
   const auto decoder = ViewPcaDecoder::Create(material->btfels);
   ASSERT_TRUE(decoder.ok());
@@ -117,13 +109,13 @@ TEST(ViewPcaTest, AllComponentsAreExactAtSampledDirections) {
 
 TEST(ViewPcaTest, FewerLightsThanComponents) {
   SampledBtf btf = ShinyBtf(3, 3, RingDirections(2, 4), {{0.0, 0.0}, {0.7, 1.0}});
-  const auto material = Encode(btf, {.eigen_textures = 5});
+  const auto material = Encode("view-pca", btf, {.eigen_textures = 5});
   ASSERT_TRUE(material.ok()) << material.status();
   EXPECT_EQ(material->btfels.parameters["eigen_textures"], 1);
   EXPECT_EQ(material->btfels.num_coefficients, 5 * 3 * 2);
 
   SampledBtf one = ShinyBtf(3, 3, {{0.2, 0.0}}, {{0.5, 1.0}});
-  const auto single = Encode(one, {.eigen_textures = 5});
+  const auto single = Encode("view-pca", one, {.eigen_textures = 5});
   ASSERT_TRUE(single.ok()) << single.status();
   EXPECT_EQ(single->btfels.num_coefficients, 3);
   const auto decoder = MakeDecoder(single->btfels);
@@ -152,7 +144,7 @@ TEST(ViewPcaTest, DegenerateBtfsStayFinite) {
           }
         }
       }
-      const auto material = Encode(btf, {.eigen_textures = 5});
+      const auto material = Encode("view-pca", btf, {.eigen_textures = 5});
       ASSERT_TRUE(material.ok()) << material.status();
       const auto decoder = MakeDecoder(material->btfels);
       ASSERT_TRUE(decoder.ok());
@@ -172,17 +164,17 @@ TEST(ViewPcaTest, DegenerateBtfsStayFinite) {
 
 TEST(ViewPcaTest, DependsNeitherOnThreadsNorOnTheBudget) {
   SampledBtf btf = ShinyBtf(24, 20, RingDirections(3, 6), RingDirections(3, 7));
-  const auto reference = Encode(btf, {.eigen_textures = 4}, 1);
+  const auto reference = Encode("view-pca", btf, {.eigen_textures = 4}, 1);
   ASSERT_TRUE(reference.ok()) << reference.status();
   const auto expected = SerializeMaterial(*reference);
   for (const int threads : {2, 8}) {
-    const auto again = Encode(btf, {.eigen_textures = 4}, threads);
+    const auto again = Encode("view-pca", btf, {.eigen_textures = 4}, threads);
     ASSERT_TRUE(again.ok());
     EXPECT_TRUE(*SerializeMaterial(*again) == *expected) << threads << " threads";
   }
   // 24 texels a row: 57 KiB of samples; coefficients are 375 KiB and spill.
   SampledBtf small = ShinyBtf(24, 20, RingDirections(3, 6), RingDirections(3, 7));
-  const auto spilled = Encode(small, {.eigen_textures = 4, .memory_budget_bytes = 300'000}, 2);
+  const auto spilled = Encode("view-pca", small, {.eigen_textures = 4, .memory_budget_bytes = 300'000}, 2);
   ASSERT_TRUE(spilled.ok()) << spilled.status();
   EXPECT_TRUE(*SerializeMaterial(*spilled) == *expected);
   EXPECT_LT(small.largest_request(), 20);
@@ -191,17 +183,20 @@ TEST(ViewPcaTest, DependsNeitherOnThreadsNorOnTheBudget) {
 TEST(ViewPcaTest, RefusesByName) {
   SampledBtf btf = ShinyBtf(5, 4, RingDirections(2, 5), RingDirections(3, 4));
   for (const int c : {-1, 0, 256}) {
-    EXPECT_THAT(Message(Encode(btf, {.eigen_textures = c}).status()), HasSubstr("eigen_textures"));
+    EXPECT_THAT(Message(Encode("view-pca", btf, {.eigen_textures = c}).status()),
+                HasSubstr("eigen_textures"));
   }
-  EXPECT_EQ(Encode(btf, {.memory_budget_bytes = 1000}).status().code(), absl::StatusCode::kResourceExhausted);
+  EXPECT_EQ(Encode("view-pca", btf, {.memory_budget_bytes = 1000}).status().code(),
+            absl::StatusCode::kResourceExhausted);
   btf.at(3, 2, 1, 4, 7) = std::numeric_limits<float>::quiet_NaN();
-  EXPECT_THAT(Message(Encode(btf, {}).status()), HasSubstr("view 4, light 7, texel (3, 2), channel 1"));
+  EXPECT_THAT(Message(Encode("view-pca", btf, {}).status()),
+              HasSubstr("view 4, light 7, texel (3, 2), channel 1"));
   btf.at(3, 2, 1, 4, 7) = std::numeric_limits<float>::infinity();
-  EXPECT_THAT(Message(Encode(btf, {}).status()), HasSubstr("view 4, light 7"));
+  EXPECT_THAT(Message(Encode("view-pca", btf, {}).status()), HasSubstr("view 4, light 7"));
   SampledBtf below(2, 2, {{0.0, 0.0}}, {{0.0, 0.0}, {1.7, 0.0}});
-  EXPECT_THAT(Message(Encode(below, {}).status()), HasSubstr("lights[1]"));
+  EXPECT_THAT(Message(Encode("view-pca", below, {}).status()), HasSubstr("lights[1]"));
   SampledBtf none(2, 2, {}, {{0.0, 0.0}});
-  EXPECT_THAT(Message(Encode(none, {}).status()), HasSubstr("no views"));
+  EXPECT_THAT(Message(Encode("view-pca", none, {}).status()), HasSubstr("no views"));
   std::stop_source stop;
   stop.request_stop();
   RunContext context;
@@ -212,7 +207,7 @@ TEST(ViewPcaTest, RefusesByName) {
 
 TEST(ViewPcaDecoderTest, InterpolatesBetweenSamplesAndReadsThreeViews) {
   SampledBtf btf = ShinyBtf(4, 4, RingDirections(4, 9), RingDirections(4, 9));
-  const auto material = Encode(btf, {.eigen_textures = 6});
+  const auto material = Encode("view-pca", btf, {.eigen_textures = 6});
   ASSERT_TRUE(material.ok()) << material.status();
   const auto decoder = ViewPcaDecoder::Create(material->btfels);
   ASSERT_TRUE(decoder.ok());
@@ -241,7 +236,7 @@ TEST(ViewPcaDecoderTest, InterpolatesBetweenSamplesAndReadsThreeViews) {
 
 TEST(ViewPcaDecoderTest, NeverExtrapolates) {
   SampledBtf btf = ShinyBtf(4, 4, RingDirections(4, 12, 60.0), RingDirections(4, 12, 60.0));
-  const auto material = Encode(btf, {.eigen_textures = 6});
+  const auto material = Encode("view-pca", btf, {.eigen_textures = 6});
   ASSERT_TRUE(material.ok());
   const auto decoder = MakeDecoder(material->btfels);
   ASSERT_TRUE(decoder.ok());
@@ -275,7 +270,7 @@ TEST(ViewPcaDecoderTest, NeverExtrapolates) {
 
 TEST(ViewPcaDecoderTest, ATurnIsATurnOfBothDirections) {
   SampledBtf btf = ShinyBtf(3, 3, RingDirections(3, 7), RingDirections(3, 5));
-  const auto material = Encode(btf, {.eigen_textures = 3});
+  const auto material = Encode("view-pca", btf, {.eigen_textures = 3});
   ASSERT_TRUE(material.ok());
   const auto decoder = MakeDecoder(material->btfels);
   ASSERT_TRUE(decoder.ok());
@@ -292,7 +287,7 @@ TEST(ViewPcaDecoderTest, ATurnIsATurnOfBothDirections) {
 
 TEST(ViewPcaDecoderTest, RoundTripsThroughTheContainer) {
   SampledBtf btf = ShinyBtf(4, 3, RingDirections(4, 12), RingDirections(4, 12));
-  const auto material = Encode(btf, {.eigen_textures = 4});
+  const auto material = Encode("view-pca", btf, {.eigen_textures = 4});
   ASSERT_TRUE(material.ok());
   const auto bytes = SerializeMaterial(*material);
   ASSERT_TRUE(bytes.ok()) << bytes.status();
@@ -319,7 +314,7 @@ TEST(ViewPcaDecoderTest, RoundTripsThroughTheContainer) {
 
 TEST(ViewPcaDecoderTest, RefusesTablesThatDoNotFit) {
   SampledBtf btf = ShinyBtf(2, 2, RingDirections(3, 6), RingDirections(3, 6));
-  const Material material = *Encode(btf, {.eigen_textures = 4});
+  const Material material = *Encode("view-pca", btf, {.eigen_textures = 4});
   struct Case {
     const char* message;
     std::function<void(BtfelTable&)> change;
@@ -328,15 +323,15 @@ TEST(ViewPcaDecoderTest, RefusesTablesThatDoNotFit) {
       {"'light_weights' is missing", [](BtfelTable& t) { t.tables.erase("light_weights"); }},
       {"'light_triangles' is missing", [](BtfelTable& t) { t.tables.erase("light_triangles"); }},
       {"'view_triangles' is missing", [](BtfelTable& t) { t.tables.erase("view_triangles"); }},
-      {"'light_weights': shape", [](BtfelTable& t) { t.tables["light_weights"].shape[1] = 12; }},
+      {", 12, 4], expected", [](BtfelTable& t) { t.tables["light_weights"].shape[1] = 12; }},
       {"'light_weights': 65535", [](BtfelTable& t) { t.tables["light_weights"].values[3] = 65535.0F; }},
       {"'view_triangles': corner 13", [](BtfelTable& t) { t.tables["view_triangles"].values[5] = 13.0F; }},
       {"'view_triangles': corner 0.5", [](BtfelTable& t) { t.tables["view_triangles"].values[5] = 0.5F; }},
-      {"'light_triangles': shape",
+      {"of shape [3, 4], expected [-1, 3]",
        [](BtfelTable& t) {
          t.tables["light_triangles"].shape = {3, 4};
        }},
-      {"'light_triangles': shape",
+      {"of shape [0, 3], expected [-1, 3]",
        [](BtfelTable& t) {
          t.tables["light_triangles"].shape = {0, 3};
          t.tables["light_triangles"].values.clear();
@@ -367,7 +362,7 @@ TEST(ViewPcaDecoderTest, RefusesTablesThatDoNotFit) {
 
 TEST(OverlapErrorTest, ChanceIsASensitivityOfOne) {
   SampledBtf btf = ShinyBtf(12, 12, RingDirections(3, 8), RingDirections(3, 8));
-  const auto material = Encode(btf, {.eigen_textures = 5});
+  const auto material = Encode("view-pca", btf, {.eigen_textures = 5});
   ASSERT_TRUE(material.ok());
   const auto embedding = FindCodec("view-pca")->Embed(*material, 8, {});
   ASSERT_TRUE(embedding.ok());

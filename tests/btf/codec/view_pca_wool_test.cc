@@ -13,8 +13,6 @@
 namespace tessera {
 namespace {
 
-constexpr char kWool[] = "btf/ubo2003_wool128/UBO_WOOL128_decoded.zip";
-
 struct Errors {
   double rms = 0.0;       // of the samples
   double rmse = 0.0;      // of the clamped decoded values

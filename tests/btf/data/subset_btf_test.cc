@@ -16,7 +16,7 @@ namespace {
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 
-std::unique_ptr<MemoryBtf> SmallBtf() {
+std::unique_ptr<MemoryBtf> SubsettedBtf() {
   return AsymmetricBtf(5, 4, WholeDegreeDirections(2, 3), WholeDegreeDirections(3, 4));
 }
 
@@ -28,7 +28,7 @@ TEST(SubsetBtfTest, EveryFifthDirectionIsHeldOut) {
 }
 
 TEST(SubsetBtfTest, HoldsTheSourcesSamples) {
-  const auto btf = SmallBtf();
+  const auto btf = SubsettedBtf();
   const BtfSubset kept{.views = {1, 4}, .lights = {0, 3, 7, 8}, .columns = {0, 3}, .rows = {1, 2, 3}};
   const auto subset = SubsetBtf::Create(*btf, kept);
   ASSERT_TRUE(subset.ok()) << subset.status();
@@ -56,14 +56,14 @@ TEST(SubsetBtfTest, HoldsTheSourcesSamples) {
 }
 
 TEST(SubsetBtfTest, EmptyKeepsAll) {
-  const auto btf = SmallBtf();
+  const auto btf = SubsettedBtf();
   const auto subset = SubsetBtf::Create(*btf, {});
   ASSERT_TRUE(subset.ok());
   EXPECT_EQ(AllSamples(**subset), AllSamples(*btf));
 }
 
 TEST(SubsetBtfTest, NamesTheIndexThatIsWrong) {
-  const auto btf = SmallBtf();
+  const auto btf = SubsettedBtf();
   EXPECT_THAT(std::string(SubsetBtf::Create(*btf, {.views = {0, 99}}).status().message()),
               HasSubstr("view 99"));
   EXPECT_THAT(std::string(SubsetBtf::Create(*btf, {.lights = {3, 3}}).status().message()),
@@ -72,7 +72,7 @@ TEST(SubsetBtfTest, NamesTheIndexThatIsWrong) {
 }
 
 TEST(HalfBtfTest, RoundsToElevenBits) {
-  const auto btf = SmallBtf();
+  const auto btf = SubsettedBtf();
   const auto half = HalfBtf::CopyOf(*btf, 1 << 20, {});
   ASSERT_TRUE(half.ok()) << half.status();
   const std::vector<float> expected = AllSamples(*btf);
@@ -85,7 +85,7 @@ TEST(HalfBtfTest, RoundsToElevenBits) {
 }
 
 TEST(HalfBtfTest, SpilledSamplesAreThoseInMemory) {
-  const auto btf = SmallBtf();
+  const auto btf = SubsettedBtf();
   const TempFolder folder;
   const auto half = HalfBtf::CopyOf(*btf, 1 << 20, {});
   ASSERT_TRUE(half.ok()) << half.status();
@@ -100,7 +100,7 @@ TEST(HalfBtfTest, SpilledSamplesAreThoseInMemory) {
 }
 
 TEST(HalfBtfTest, RefusesWhatExceedsTheLimit) {
-  const auto btf = SmallBtf();
+  const auto btf = SubsettedBtf();
   const auto half = HalfBtf::CopyOf(*btf, HalfBtf::SizeBytes(*btf) - 1, {});
   EXPECT_EQ(half.status().code(), absl::StatusCode::kResourceExhausted);
 }

@@ -14,8 +14,6 @@
 namespace tessera {
 namespace {
 
-constexpr char kWool[] = "btf/ubo2003_wool128/UBO_WOOL128_decoded.zip";
-
 TEST(WoolTest, ImportsAllImagesAndDirections) {
   TESSERA_REQUIRE_DATA(kWool);
   const auto begin = std::chrono::steady_clock::now();

@@ -29,7 +29,7 @@ std::vector<Direction> Measured() {
   return Rings({{0.0, 1}, {15.0, 6}, {30.0, 12}, {45.0, 18}, {60.0, 20}, {75.0, 24}});
 }
 
-std::vector<Direction> Random(int count, uint64_t seed, double max_theta_deg = 80.0) {
+std::vector<Direction> ScatteredDirections(int count, uint64_t seed, double max_theta_deg = 80.0) {
   Rng rng(seed);
   std::vector<Direction> directions;
   for (int i = 0; i < count; ++i) {
@@ -89,8 +89,8 @@ BarycentricWeights Locate(const std::vector<Direction>& directions, const Eigen:
 
 TEST(HemisphereTriangulationTest, CoversTheHullWithDelaunayTriangles) {
   std::vector<std::vector<Direction>> sets = {Measured(),
-                                              Random(60, 1),
-                                              Random(200, 2),
+                                              ScatteredDirections(60, 1),
+                                              ScatteredDirections(200, 2),
                                               Rings({{0.0, 1}, {40.0, 5}}),
                                               Rings({{30.0, 8}, {60.0, 8}}),
                                               Rings({{0.0, 1}, {37.5, 6}, {75.0, 6}})};
@@ -165,7 +165,7 @@ double NearestByForce(const std::vector<Direction>& directions,
 TEST(HemisphereTriangulationTest, MovesToTheNearestPointOfTheTriangles) {
   const std::vector<std::vector<Direction>> sets = {
       Measured(),
-      Random(12, 3, 40.0),
+      ScatteredDirections(12, 3, 40.0),
       Rings({{50.0, 3}}),
       {{0.3, 0.2}, {0.8, 0.5}},                                // two
       {{0.9, 1.0}, {0.0, 0.0}, {0.5, 1.0 + kPi}, {0.4, 1.0}},  // on one line
@@ -283,7 +283,7 @@ TEST(HemisphereTriangulationTest, AMissingPoleIsBridged) {
 }
 
 TEST(HemisphereTriangulationTest, HostileTrianglesStayFinite) {
-  const std::vector<Direction> directions = Random(20, 9);
+  const std::vector<Direction> directions = ScatteredDirections(20, 9);
   Rng rng(10);
   std::vector<DirectionTriangle> triangles;
   for (int i = 0; i < 40; ++i) {
@@ -291,7 +291,7 @@ TEST(HemisphereTriangulationTest, HostileTrianglesStayFinite) {
                          static_cast<int>(rng.NextBelow(20))});
   }
   const HemisphereInterpolator interpolator(directions, triangles);
-  for (const Direction& at : Random(500, 11, 89.9)) {
+  for (const Direction& at : ScatteredDirections(500, 11, 89.9)) {
     const BarycentricWeights w = interpolator.Locate(VectorFromDirection(at));
     EXPECT_NEAR(w.weight[0] + w.weight[1] + w.weight[2], 1.0, 1e-9);
     for (int s = 0; s < 3; ++s) {

@@ -18,8 +18,6 @@ namespace {
 
 using testing::HasSubstr;
 
-constexpr char kWool[] = "btf/ubo2003_wool128/UBO_WOOL128_decoded.zip";
-
 TEST(WoolTilesTest, LiesInThePlaneAndIsNotTurned) {
   TESSERA_REQUIRE_DATA(kWool);
   const auto source = ImportBtf(TestData(kWool), {}, RunContext{});

@@ -9,10 +9,6 @@
 namespace tessera {
 namespace {
 
-const Arrangement& Get(std::string_view id) {
-  return **FindArrangement(id);
-}
-
 TEST(TileCodeTest, FollowsTheFormulaAndInverts) {
   // south 1+, east 0-, north 1-, west 0+: 1 + 2*4 + 3*16 + 0*64.
   EXPECT_EQ(TileCode({TileSide{1, Sign::kPlus}, TileSide{0, Sign::kMinus}, TileSide{1, Sign::kMinus},
@@ -24,7 +20,7 @@ TEST(TileCodeTest, FollowsTheFormulaAndInverts) {
 }
 
 TEST(ArrangementTest, Plane16HasEveryColouringOfOneSignPattern) {
-  const Arrangement& plane = Get("plane-16");
+  const Arrangement& plane = **FindArrangement("plane-16");
   ASSERT_EQ(plane.codes.size(), 16u);
   EXPECT_FALSE(plane.turned_strips);
   std::set<uint32_t> seen;
@@ -41,7 +37,7 @@ TEST(ArrangementTest, Plane16HasEveryColouringOfOneSignPattern) {
 }
 
 TEST(ArrangementTest, Surface96HasEveryTileOfTwoPlusAndTwoMinus) {
-  const Arrangement& surface = Get("surface-96");
+  const Arrangement& surface = **FindArrangement("surface-96");
   ASSERT_EQ(surface.codes.size(), 96u);
   EXPECT_TRUE(surface.turned_strips);
   int half_turn_symmetric = 0;
@@ -69,9 +65,11 @@ TEST(ArrangementTest, CodesAscendAndAreFound) {
 TEST(ArrangementTest, DigestsArePermanent) {
   // `printf 'plane-16\n160\n..' | sha256sum`. A changed list needs a new id: files in users' hands carry
   // these.
-  EXPECT_EQ(Get("plane-16").sha256, "a80b6a32c639e721d1c1a20ec4990ff149c944089674ac878b051af69484ab71");
-  EXPECT_EQ(Get("surface-96").sha256, "137cf8cf0c716fba75c24b9d3ea8a10d97f4f1e3586926fcc3a2f29ac18703f4");
-  EXPECT_EQ(ArrangementListing(Get("plane-16")).substr(0, 17), "plane-16\n160\n161\n");
+  EXPECT_EQ((*FindArrangement("plane-16"))->sha256,
+            "a80b6a32c639e721d1c1a20ec4990ff149c944089674ac878b051af69484ab71");
+  EXPECT_EQ((*FindArrangement("surface-96"))->sha256,
+            "137cf8cf0c716fba75c24b9d3ea8a10d97f4f1e3586926fcc3a2f29ac18703f4");
+  EXPECT_EQ(ArrangementListing(**FindArrangement("plane-16")).substr(0, 17), "plane-16\n160\n161\n");
 }
 
 TEST(ArrangementTest, UnknownIdsAreNamed) {

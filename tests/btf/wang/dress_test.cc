@@ -19,12 +19,8 @@
 namespace tessera {
 namespace {
 
-const Arrangement& Get(std::string_view id) {
-  return **FindArrangement(id);
-}
-
 DressResult Dress(const QuadMesh& mesh, std::string_view arrangement, const DressParams& params = {}) {
-  auto result = DressMesh(mesh, Get(arrangement), params, RunContext{});
+  auto result = DressMesh(mesh, **FindArrangement(arrangement), params, RunContext{});
   EXPECT_TRUE(result.ok()) << result.status();
   return result.ok() ? *std::move(result) : DressResult{};
 }
@@ -69,7 +65,7 @@ TEST(DressMeshTest, EveryShapeHasLegalNeighboursOnASurfaceArrangement) {
   for (const std::string_view shape : BuiltinShapeNames()) {
     const DressResult result = Dress(*BuiltinShape(shape), "surface-96");
     EXPECT_TRUE(result.breaks.empty());
-    ExpectLegal(result.dressing, Get("surface-96"));
+    ExpectLegal(result.dressing, **FindArrangement("surface-96"));
     EXPECT_TRUE(std::all_of(result.dressing.turns.begin(), result.dressing.turns.end(), [](uint8_t turns) {
       return turns == 0;
     })) << "all 96 codes are there, so the smallest fitting turn is 0";
@@ -77,17 +73,17 @@ TEST(DressMeshTest, EveryShapeHasLegalNeighboursOnASurfaceArrangement) {
 }
 
 TEST(DressMeshTest, OpenAndClosedAndRandomMeshesHaveLegalNeighbours) {
-  ExpectLegal(Dress(Cube(), "surface-96", {.target_quads = 6}).dressing, Get("surface-96"));
+  ExpectLegal(Dress(Cube(), "surface-96", {.target_quads = 6}).dressing, **FindArrangement("surface-96"));
   ExpectLegal(Dress(Strip(1, 1, Closing::kOpen), "surface-96", {.target_quads = 1}).dressing,
-              Get("surface-96"));
+              **FindArrangement("surface-96"));
   ExpectLegal(Dress(Strip(3, 2, Closing::kOpen), "surface-96", {.target_quads = 1}).dressing,
-              Get("surface-96"));
-  ExpectLegal(Dress(Strip(9, 3, Closing::kBand), "surface-96").dressing, Get("surface-96"));
+              **FindArrangement("surface-96"));
+  ExpectLegal(Dress(Strip(9, 3, Closing::kBand), "surface-96").dressing, **FindArrangement("surface-96"));
   for (uint64_t seed = 0; seed < 40; ++seed) {
     const QuadMesh mesh = RandomPolycube(seed);
     const DressResult result = Dress(mesh, "surface-96", {.seed = seed, .target_quads = 1});
     EXPECT_EQ(result.dressing.mesh.quads.size(), mesh.quads.size());
-    ExpectLegal(result.dressing, Get("surface-96"));
+    ExpectLegal(result.dressing, **FindArrangement("surface-96"));
   }
 }
 
@@ -133,7 +129,7 @@ TEST(DressMeshTest, PlaneAndTorusTakePlane16WithoutBreaks) {
   for (const std::string_view shape : {"plane", "torus"}) {
     const DressResult result = Dress(*BuiltinShape(shape), "plane-16", {.target_quads = 1000});
     EXPECT_TRUE(result.breaks.empty());
-    ExpectLegal(result.dressing, Get("plane-16"));
+    ExpectLegal(result.dressing, **FindArrangement("plane-16"));
     const auto neighbours = BuildTileNeighbours(result.dressing);
     for (const auto& sides : *neighbours) {
       for (const TileNeighbour& across : sides) {
@@ -151,12 +147,12 @@ TEST(DressMeshTest, FindsAConsistentFrameHoweverTheFacesStart) {
   }
   const DressResult result = Dress(mesh, "plane-16", {.target_quads = 1});
   EXPECT_TRUE(result.breaks.empty());
-  ExpectLegal(result.dressing, Get("plane-16"));
+  ExpectLegal(result.dressing, **FindArrangement("plane-16"));
 }
 
 TEST(DressMeshTest, BreaksOfPlane16AreRefusedOrListed) {
   const QuadMesh cube = Cube();
-  const auto refused = DressMesh(cube, Get("plane-16"), {.target_quads = 6}, RunContext{});
+  const auto refused = DressMesh(cube, **FindArrangement("plane-16"), {.target_quads = 6}, RunContext{});
   EXPECT_EQ(refused.status().code(), absl::StatusCode::kFailedPrecondition);
   EXPECT_THAT(std::string(refused.status().message()),
               testing::HasSubstr("plane-16 needs one consistent frame"));
@@ -178,7 +174,8 @@ TEST(DressMeshTest, BreaksOfPlane16AreRefusedOrListed) {
 
 TEST(DressMeshTest, RefusesWhatItCannotDressByName) {
   const auto message = [](const QuadMesh& mesh, const DressParams& params = {}) {
-    return std::string(DressMesh(mesh, Get("surface-96"), params, RunContext{}).status().message());
+    return std::string(
+        DressMesh(mesh, **FindArrangement("surface-96"), params, RunContext{}).status().message());
   };
   EXPECT_THAT(message(QuadMesh{}), testing::HasSubstr("no faces"));
   EXPECT_THAT(message(Strip(8, 1, Closing::kMoebius)), testing::HasSubstr("same direction along the edge"));
@@ -193,19 +190,21 @@ TEST(DressMeshTest, StopsWhenAskedTo) {
   RunContext context;
   context.stop = stop.get_token();
   stop.request_stop();
-  EXPECT_EQ(DressMesh(Cube(), Get("surface-96"), {}, context).status().code(), absl::StatusCode::kCancelled);
+  EXPECT_EQ(DressMesh(Cube(), **FindArrangement("surface-96"), {}, context).status().code(),
+            absl::StatusCode::kCancelled);
 }
 
 TEST(FindBreaksTest, NoticesAWrongTile) {
   Dressing dressing = Dress(*BuiltinShape("torus"), "surface-96").dressing;
-  EXPECT_TRUE(FindBreaks(dressing, Get("surface-96"))->empty());
-  const TileSides sides = SidesFromTileCode(Get("surface-96").codes[dressing.tile[7]]);
+  EXPECT_TRUE(FindBreaks(dressing, **FindArrangement("surface-96"))->empty());
+  const TileSides sides = SidesFromTileCode((*FindArrangement("surface-96"))->codes[dressing.tile[7]]);
   TileSides wrong = sides;
   wrong[1].colour ^= 1;
-  dressing.tile[7] = static_cast<uint32_t>(Get("surface-96").IndexOfCode(TileCode(wrong)));
-  EXPECT_EQ(FindBreaks(dressing, Get("surface-96"))->size(), 1u);
+  dressing.tile[7] = static_cast<uint32_t>((*FindArrangement("surface-96"))->IndexOfCode(TileCode(wrong)));
+  EXPECT_EQ(FindBreaks(dressing, **FindArrangement("surface-96"))->size(), 1u);
   dressing.tile[7] = 96;
-  EXPECT_EQ(FindBreaks(dressing, Get("surface-96")).status().code(), absl::StatusCode::kInvalidArgument);
+  EXPECT_EQ(FindBreaks(dressing, **FindArrangement("surface-96")).status().code(),
+            absl::StatusCode::kInvalidArgument);
 }
 
 TEST(EulerSignsTest, TwoOfEachInEveryQuadAndOneOfEachOnEveryEdge) {
