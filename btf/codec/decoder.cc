@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cassert>
+#include <cstring>
 #include <string_view>
 #include <utility>
 
@@ -40,139 +42,156 @@ constexpr std::array kKnownCodecs = {
 };
 
 constexpr int kLanes = 8;
-using Lanes = Eigen::Array<float, kLanes, 1>;
+using Lanes = float __attribute__((vector_size(kLanes * sizeof(float))));
 
 Lanes LanesOf(const uint8_t* codes) {
 #ifdef __AVX2__
-  // Compilers turn the loop below into three times as many instructions.
-  Lanes values;
-  const __m128i bytes = _mm_loadl_epi64(reinterpret_cast<const __m128i*>(codes));
-  _mm256_storeu_ps(values.data(), _mm256_cvtepi32_ps(_mm256_cvtepu8_epi32(bytes)));
-  return values;
+  // Compilers turn what is below into three times as many instructions.
+  return _mm256_cvtepi32_ps(_mm256_cvtepu8_epi32(_mm_loadl_epi64(reinterpret_cast<const __m128i*>(codes))));
 #else
-  return Eigen::Map<const Eigen::Array<uint8_t, kLanes, 1>>(codes).cast<float>();
+  uint8_t __attribute__((vector_size(kLanes))) bytes;
+  std::memcpy(&bytes, codes, kLanes);
+  return __builtin_convertvector(bytes, Lanes);
 #endif
 }
 
-// Sum of w[i] * codes[i]; lanes of their own, so that it vectorises without reordering a sum.
-float Dot(const float* w, const uint8_t* codes, int count) {
-  std::array<Lanes, 4> sums = {Lanes::Zero(), Lanes::Zero(), Lanes::Zero(), Lanes::Zero()};
-  const auto add = [&](int i, Lanes& sum) { sum += Eigen::Map<const Lanes>(w + i) * LanesOf(codes + i); };
-  int i = 0;
-  for (; i + 4 * kLanes <= count; i += 4 * kLanes) {
-    add(i, sums[0]);
-    add(i + kLanes, sums[1]);
-    add(i + 2 * kLanes, sums[2]);
-    add(i + 3 * kLanes, sums[3]);
+// A colour; the last element is of no account.
+using Rgb = float __attribute__((vector_size(4 * sizeof(float))));
+
+// The sum of the lanes, for each channel.
+Rgb SumsOf(const std::array<Lanes, 3>& lanes) {
+#ifdef __AVX2__
+  const __m256 pairs = _mm256_hadd_ps(_mm256_hadd_ps(lanes[0], lanes[1]), _mm256_hadd_ps(lanes[2], lanes[2]));
+  return _mm256_castps256_ps128(pairs) + _mm256_extractf128_ps(pairs, 1);
+#else
+  Rgb sums{};
+  for (size_t channel = 0; channel < 3; ++channel) {
+    const Lanes& x = lanes[channel];
+    sums[channel] = ((x[0] + x[1]) + (x[2] + x[3])) + ((x[4] + x[5]) + (x[6] + x[7]));
   }
-  for (; i + kLanes <= count; i += kLanes) {
-    add(i, sums[0]);
-  }
-  float rest = 0.0F;
-  for (; i < count; ++i) {
-    rest += w[i] * static_cast<float>(codes[i]);
-  }
-  return ((sums[0] + sums[1]) + (sums[2] + sums[3])).sum() + rest;
+  return sums;
+#endif
 }
 
-// In DecodeTexels: runs of at least so many codes that no other channel reads are summed one by one, the rest
-// for all channels together, so that a code is converted once.
-constexpr int kLongRun = 128;
-// Codecs that read little of a BTFel step through memory too wide for the processor to see ahead: what they
-// read is fetched so many texels ahead.
-constexpr size_t kPrefetchedTexels = 16;
-
-// Eight codes and their weights in each channel.
+// Eight codes and their weights in `kChannels` channels.
+template <size_t kChannels>
 struct Block {
   int first = 0;
-  std::array<Lanes, 3> weights = {Lanes::Zero(), Lanes::Zero(), Lanes::Zero()};
+  std::array<Lanes, kChannels> weights{};
 };
 
-struct LongRun {
-  LinearForm::Run run;
-  std::vector<float> weights;
-};
-
-// A form on codes: rgb = constant + what the long runs and the blocks add.
+// A form on codes, for each channel: rgb = constant + what the blocks add.
 struct CodeForm {
-  std::array<float, 3> constant;
-  std::vector<LongRun> long_runs;
-  std::vector<Block> blocks;
-  bool is_sparse = false;  // less than half of a BTFel is read
+  Rgb constant{};
+  std::array<std::vector<Block<1>>, 3> blocks;  // of codes that no other channel reads
+  std::vector<Block<3>> shared_blocks;
+  std::vector<int> lines;  // codes of a large BTFel, one for each line of memory that is read
 };
+
+// How many texels are summed together: each weight is loaded once for all of them, and their sums just fit
+// the processor's registers.
+constexpr size_t kTexelsTogether = 4;
+// The processor does not see ahead where little of a large BTFel is read, nor where four of them are read at
+// once: what is read is fetched so many texels ahead. Small ones it fetches better by itself.
+constexpr size_t kPrefetchedTexels = 8;
+constexpr int kLargeBtfelBytes = 256;
+
+// Codes that have readers, one for each line of memory that they may lie in.
+std::vector<int> LinesOf(std::span<const unsigned> readers) {
+  constexpr int kLineBytes = 64;
+  std::vector<int> lines;
+  for (int i = 0; std::cmp_less(i, readers.size()); ++i) {
+    // A BTFel may start anywhere in a line: the last code of several may lie in one more.
+    const bool is_last = std::cmp_equal(i + 1, readers.size()) || readers[i + 1] == 0;
+    if (readers[i] != 0 && (lines.empty() || is_last || i >= lines.back() + kLineBytes)) {
+      lines.push_back(i);
+    }
+  }
+  return lines;
+}
 
 CodeForm MakeCodeForm(const LinearForm& form, std::span<const float> offset, std::span<const float> step) {
   const int k = static_cast<int>(offset.size());
   CodeForm result;
   Eigen::Array3d constant = Eigen::Array3d::Zero();
-  std::vector<std::array<float, 3>> joint(k, {0.0F, 0.0F, 0.0F});
-  std::vector<bool> is_joint(k, false);
-  size_t used = 0;
+  std::vector<std::array<float, 3>> weights(k, {0.0F, 0.0F, 0.0F});
+  std::vector<unsigned> readers(k, 0);  // a bit for each channel
   const double* weight = form.weights.data();
   for (const LinearForm::Run& run : form.runs) {
-    const bool is_shared = std::ranges::any_of(form.runs, [&run](const LinearForm::Run& other) {
-      return other.channel != run.channel && other.first == run.first;
-    });
-    const bool is_alone = k < kLanes || (run.count >= kLongRun && !is_shared);
-    if (is_alone) {
-      result.long_runs.push_back({run, std::vector<float>(run.count)});
-      used += run.count;
-    }
-    for (int i = 0; i < run.count; ++i) {
+    for (int i = run.first; i < run.first + run.count; ++i) {
       // weight * (offset + step * code) = constant + (weight * step) * code.
-      const int code = run.first + i;
-      const auto on_code = static_cast<float>(*weight * step[code]);
-      constant[run.channel] += *weight++ * offset[code];
-      if (is_alone) {
-        result.long_runs.back().weights[i] = on_code;
-      } else {
-        joint[code][run.channel] += on_code;
-        is_joint[code] = true;
-      }
+      constant[run.channel] += *weight * offset[i];
+      weights[i][run.channel] += static_cast<float>(*weight++ * step[i]);
+      readers[i] |= 1U << run.channel;
     }
   }
   for (int channel = 0; channel < 3; ++channel) {
     result.constant[channel] = static_cast<float>(constant[channel]);
   }
-  for (int i = 0; i < k; ++i) {
-    if (!is_joint[i]) {
-      continue;
-    }
-    // The last block ends with the BTFel, and leaves out what the one before it has.
-    Block& block = result.blocks.emplace_back();
-    block.first = std::min(i, k - kLanes);
-    for (int lane = i - block.first; lane < kLanes; ++lane) {
-      for (int channel = 0; channel < 3; ++channel) {
-        block.weights[channel][lane] = joint[block.first + lane][channel];
+  // Cuts the codes with the given readers into blocks; fill(block, lane, code) sets the weights.
+  const auto cut = [&](const auto& has_readers, auto& blocks, const auto& fill) {
+    for (int i = 0; i < k; ++i) {
+      if (has_readers(readers[i])) {
+        auto& block = blocks.emplace_back();
+        // The last block ends with the BTFel, and leaves out what the one before it has.
+        block.first = std::min(i, std::max(0, k - kLanes));
+        const int end = std::min(block.first + kLanes, k);
+        for (; i < end; ++i) {
+          if (has_readers(readers[i])) {
+            fill(block, i - block.first, i);
+          }
+        }
+        --i;
       }
     }
-    i = block.first + kLanes - 1;
-    used += kLanes;
+  };
+  for (unsigned channel = 0; channel < 3; ++channel) {
+    cut([&](unsigned bits) { return bits == 1U << channel; }, result.blocks[channel],
+        [&](Block<1>& block, int lane, int code) { block.weights[0][lane] = weights[code][channel]; });
   }
-  result.is_sparse = 2 * used < static_cast<size_t>(k);
+  cut([](unsigned bits) { return std::popcount(bits) > 1; }, result.shared_blocks,
+      [&](Block<3>& block, int lane, int code) {
+        for (int channel = 0; channel < 3; ++channel) {
+          block.weights[channel][lane] = weights[code][channel];
+        }
+      });
+  if (k >= kLargeBtfelBytes) {
+    result.lines = LinesOf(readers);
+  }
   return result;
 }
 
-void DecodeTexel(const CodeForm& form, const uint8_t* codes, float* rgb) {
-  std::array<float, 3> sum = form.constant;
-  for (const LongRun& part : form.long_runs) {
-    sum[part.run.channel] += Dot(part.weights.data(), codes + part.run.first, part.run.count);
+// body(0), body(1) .. as constants, so that what they index stays in registers.
+template <size_t kCount, typename Body>
+void Unrolled(const Body& body) {
+  [&]<size_t... kIndices>(std::index_sequence<kIndices...>) {
+    (body(std::integral_constant<size_t, kIndices>()), ...);
   }
-  if (!form.blocks.empty()) {
-    std::array<Lanes, 3> sums = {Lanes::Zero(), Lanes::Zero(), Lanes::Zero()};
-    for (const Block& block : form.blocks) {
-      const Lanes values = LanesOf(codes + block.first);
-      for (int channel = 0; channel < 3; ++channel) {
-        sums[channel] += block.weights[channel] * values;
-      }
+  (std::make_index_sequence<kCount>());
+}
+
+// `kTexels` BTFels, k codes apart, at least kLanes codes each.
+template <size_t kTexels>
+[[gnu::flatten, gnu::noinline]] void DecodeTogether(const CodeForm& form, const uint8_t* codes, size_t k,
+                                                    float* rgb) {
+  std::array<std::array<Lanes, 3>, kTexels> sums{};
+  for (const Block<3>& block : form.shared_blocks) {
+    Unrolled<kTexels>([&](auto t) {
+      const Lanes values = LanesOf(codes + t * k + block.first);
+      Unrolled<3>([&](auto channel) { sums[t][channel] += block.weights[channel] * values; });
+    });
+  }
+  Unrolled<3>([&](auto channel) {
+    for (const Block<1>& block : form.blocks[channel]) {
+      Unrolled<kTexels>(
+          [&](auto t) { sums[t][channel] += block.weights[0] * LanesOf(codes + t * k + block.first); });
     }
-    for (int channel = 0; channel < 3; ++channel) {
-      sum[channel] += sums[channel].sum();
-    }
-  }
-  for (int channel = 0; channel < 3; ++channel) {
-    rgb[channel] = std::max(sum[channel], 0.0F);
-  }
+  });
+  Unrolled<kTexels>([&](auto t) {
+    const Rgb sum = form.constant + SumsOf(sums[t]);
+    const Rgb colour = sum > 0.0F ? sum : Rgb{};
+    std::memcpy(rgb + 3 * t, &colour, 3 * sizeof(float));
+  });
 }
 
 }  // namespace
@@ -222,15 +241,29 @@ void Decoder::DecodeTexels(std::span<const uint8_t> codes, const Eigen::Vector3d
   assert(codes.size() % k == 0 && rgb.size() == codes.size() / k * 3);
   const LinearForm form = Form(UnturnedFromTurned(light, turns), UnturnedFromTurned(view, turns));
   const CodeForm on_codes = MakeCodeForm(form, offset_, step_);
-  for (size_t texel = 0; texel * k < codes.size(); ++texel) {
-    if (on_codes.is_sparse && (texel + kPrefetchedTexels) * k < codes.size()) {
-      const uint8_t* const ahead = codes.data() + (texel + kPrefetchedTexels) * k;
-      for (const Block& block : on_codes.blocks) {
-        __builtin_prefetch(ahead + block.first);
-        __builtin_prefetch(ahead + block.first + kLanes - 1);
+  const size_t num_texels = codes.size() / k;
+  if (k < kLanes) {
+    for (size_t texel = 0; texel < num_texels; ++texel) {
+      std::array<uint8_t, kLanes> padded{};
+      std::ranges::copy(codes.subspan(texel * k, k), padded.begin());
+      DecodeTogether<1>(on_codes, padded.data(), k, rgb.data() + 3 * texel);
+    }
+    return;
+  }
+  size_t texel = 0;
+  for (; texel + kTexelsTogether <= num_texels; texel += kTexelsTogether) {
+    if (texel + kTexelsTogether + kPrefetchedTexels <= num_texels) {
+      for (size_t t = 0; t < kTexelsTogether; ++t) {
+        const uint8_t* const ahead = codes.data() + (texel + t + kPrefetchedTexels) * k;
+        for (const int code : on_codes.lines) {
+          __builtin_prefetch(ahead + code);
+        }
       }
     }
-    DecodeTexel(on_codes, codes.data() + texel * k, rgb.data() + 3 * texel);
+    DecodeTogether<kTexelsTogether>(on_codes, codes.data() + texel * k, k, rgb.data() + 3 * texel);
+  }
+  for (; texel < num_texels; ++texel) {
+    DecodeTogether<1>(on_codes, codes.data() + texel * k, k, rgb.data() + 3 * texel);
   }
 }
 

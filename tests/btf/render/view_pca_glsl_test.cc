@@ -4,11 +4,9 @@
 
 #include <gtest/gtest.h>
 
-#include "btf/render/preview.h"
-#include "btf/render/reference.h"
 #include "tests/btf/codec/synthetic_btf.h"
 #include "tests/btf/render/blend_queries.h"
-#include "tests/btf/render/hand_made.h"
+#include "tests/btf/render/codec_preview.h"
 
 namespace tessera {
 namespace {
@@ -33,23 +31,7 @@ TEST(ViewPcaGlslTest, BlendsWhatTheDecoderBlends) {
 }
 
 TEST(ViewPcaGlslTest, PreviewsAsTheReferenceDoes) {
-  const Dressing dressing = testing::RandomDressing(testing::SkewedGrid(4, 0.3, 7), 8);
-  const TileSet tile_set =
-      testing::RandomTileSet(Encoded(5, RingDirections(4, 9), RingDirections(4, 12, 60.0)), 16, 3);
-  PreviewScene scene{.dressing = &dressing, .tile_set = &tile_set, .width = 160, .height = 120};
-  scene.camera.eye = {0.6, -1.3, 1.8};
-  scene.camera.fov_y_rad = RadFromDeg(60.0);
-  scene.lights.push_back({.kind = Light::Kind::kPoint, .place = {-0.5, 0.2, 1.0}});
-  const auto context = CreateOsmesaContext();
-  ASSERT_TRUE(context.ok()) << context.status();
-  const auto image = RenderGl(**context, scene, {});
-  ASSERT_TRUE(image.ok()) << image.status();
-  const auto reference = RenderReferenceWithDepth(scene, {});
-  ASSERT_TRUE(reference.ok()) << reference.status();
-  const testing::Comparison comparison = testing::CompareAwayFromSilhouettes(*image, *reference);
-  EXPECT_LT(comparison.rmse, 1.0 / 255.0);
-  EXPECT_LT(comparison.differing, 0.01);
-  EXPECT_GT(comparison.pixels, 160U * 120 / 20);
+  testing::ExpectPreviewsAsTheReferenceDoes(Encoded(5, RingDirections(4, 9), RingDirections(4, 12, 60.0)));
 }
 
 TEST(ViewPcaGlslTest, FewDirections) {

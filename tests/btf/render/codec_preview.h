@@ -1,0 +1,36 @@
+// The picture of a codec's shader against the CPU reference, for the tests of each codec's GLSL.
+#pragma once
+
+#include <utility>
+
+#include <gtest/gtest.h>
+
+#include "btf/render/preview.h"
+#include "btf/render/reference.h"
+#include "tests/btf/render/hand_made.h"
+
+namespace tessera::testing {
+
+inline void ExpectPreviewsAsTheReferenceDoes(BtfelTable table) {
+  const Dressing dressing = RandomDressing(SkewedGrid(4, 0.3, 7), 8);
+  const TileSet tile_set = RandomTileSet(std::move(table), 16, 3);
+  PreviewScene scene{.dressing = &dressing, .tile_set = &tile_set, .width = 160, .height = 120};
+  scene.camera.eye = {0.6, -1.3, 1.8};
+  scene.camera.fov_y_rad = RadFromDeg(60.0);
+  scene.lights.push_back({.kind = Light::Kind::kPoint, .place = {-0.5, 0.2, 1.0}});
+  const auto context = CreateOsmesaContext();
+  ASSERT_TRUE(context.ok()) << context.status();
+  for (const Filter filter : {Filter::kBilinear, Filter::kNearest}) {
+    scene.filter = filter;
+    const auto image = RenderGl(**context, scene, {});
+    ASSERT_TRUE(image.ok()) << image.status();
+    const auto reference = RenderReferenceWithDepth(scene, {});
+    ASSERT_TRUE(reference.ok()) << reference.status();
+    const Comparison comparison = CompareAwayFromSilhouettes(*image, *reference);
+    EXPECT_LT(comparison.rmse, 1.0 / 255.0);
+    EXPECT_LT(comparison.differing, 0.01);
+    EXPECT_GT(comparison.pixels, 160U * 120 / 20);
+  }
+}
+
+}  // namespace tessera::testing
