@@ -8,6 +8,20 @@
 #include <Eigen/Eigenvalues>
 
 namespace tessera {
+namespace {
+
+// std::sqrt is correctly rounded, so the same on every machine; Eigen's packets refine an estimate. A loop of
+// nothing else, for the compiler to turn into vector instructions.
+template <typename Lanes>
+Lanes SquareRoots(const Lanes& x) {
+  Lanes roots;
+  for (int lane = 0; lane < Lanes::SizeAtCompileTime; ++lane) {
+    roots[lane] = std::sqrt(x[lane]);
+  }
+  return roots;
+}
+
+}  // namespace
 
 template <typename Scalar>
 ClsSolver<Scalar>::ClsSolver(const Eigen::MatrixXd& basis) {
@@ -35,11 +49,7 @@ void ClsSolver<Scalar>::Shrink(const Eigen::Ref<const Vector>& energies,
     Scalar* const block = projected.data() + row;
     const Eigen::Index stride = projected.outerStride();
     const Lanes energy = energies.template segment<kLanes>(row).array();
-    Lanes inverse_radius;
-    for (int lane = 0; lane < kLanes; ++lane) {
-      // std::sqrt is correctly rounded, so the same on every machine; Eigen's packets refine an estimate.
-      inverse_radius[lane] = Scalar(1) / std::sqrt(std::max(energy[lane], tiny));
-    }
+    const Lanes inverse_radius = SquareRoots<Lanes>(energy.max(tiny)).inverse();
     // Every term alone bounds lambda from below: |p_i| / (w_i + lambda) <= sqrt(E).
     Lanes lambda = Lanes::Constant(floor);
     for (Eigen::Index i = 0; i < n; ++i) {
@@ -70,12 +80,11 @@ void ClsSolver<Scalar>::Shrink(const Eigen::Ref<const Vector>& energies,
       if (!((norm2 - limit).maxCoeff() > Scalar(0))) {
         break;
       }
+      const Lanes next = lambda + norm2 / slope * (SquareRoots<Lanes>(norm2) * inverse_radius - Scalar(1));
       // A signal that has converged keeps its lambda, so the others in its group cannot move it. Plain lanes,
       // for the compiler to turn into a blend: Eigen's select is not vectorised.
       for (int lane = 0; lane < kLanes; ++lane) {
-        const Scalar excess = std::sqrt(norm2[lane]) * inverse_radius[lane] - Scalar(1);
-        const Scalar next = lambda[lane] + norm2[lane] / slope[lane] * excess;
-        lambda[lane] = norm2[lane] > limit[lane] ? next : lambda[lane];
+        lambda[lane] = norm2[lane] > limit[lane] ? next[lane] : lambda[lane];
       }
     }
     for (Eigen::Index i = 0; i < n; ++i) {

@@ -87,9 +87,16 @@ struct Product {
 // What a codec cannot do without, for `texels` texels of n views and n lights.
 std::vector<Product> ProductsOf(std::string_view codec, int64_t texels, int n) {
   if (codec.starts_with("dsh")) {
-    // [Leung2007, 3.1]: the lights of every view, then the views of every light coefficient.
+    // [Leung2007, 3.1]: the lights of every view, then the views of every light coefficient; constrained
+    // least squares also rotates both back by Q.
     constexpr int kCoefficients = 25;
-    return {{kCoefficients, n, 3 * n, texels}, {kCoefficients, n, 3 * kCoefficients, texels}};
+    std::vector<Product> products = {{kCoefficients, n, 3 * n, texels},
+                                     {kCoefficients, n, 3 * kCoefficients, texels}};
+    if (codec == "dsh-cls") {
+      products.push_back({kCoefficients, kCoefficients, 3 * n, texels});
+      products.push_back({kCoefficients, kCoefficients, 3 * kCoefficients, texels});
+    }
+    return products;
   }
   if (codec == "dfmf") {
     // Onto the space and back in every pass of the Lanczos iteration, and once onto what it found, for

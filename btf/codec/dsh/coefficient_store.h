@@ -10,6 +10,7 @@
 #include <cstdint>
 #include <cstdlib>
 #include <filesystem>
+#include <future>
 #include <memory>
 #include <optional>
 #include <span>
@@ -39,7 +40,8 @@ class CoefficientStore {
 
   // Room for values [begin, begin + count), valid until the next call.
   [[nodiscard]] std::span<float> BeginWrite(uint64_t begin, uint64_t count);
-  // Errors: SpillFile::Write's.
+  // A spilled block is written while the next one is filled: there are two in memory. Errors:
+  // SpillFile::Write's, of this block or the one before.
   [[nodiscard]] absl::Status EndWrite();
   // The values written there; the span is valid until the next call. Errors: SpillFile::Read's.
   [[nodiscard]] absl::StatusOr<std::span<const float>> Read(uint64_t begin, uint64_t count);
@@ -47,14 +49,23 @@ class CoefficientStore {
  private:
   CoefficientStore() = default;
 
-  // Not zeroed: the threads that fill it also fault its pages in.
-  std::span<float> Resize(uint64_t count);
+  struct Buffer {
+    std::unique_ptr<float[], FreeDeleter> values;
+    uint64_t size = 0;
+
+    // Not zeroed: the threads that fill it also fault its pages in.
+    std::span<float> Resize(uint64_t count);
+  };
+
+  // Until the block before is written.
+  absl::Status Wait();
 
   std::optional<SpillFile> file_;
-  std::unique_ptr<float[], FreeDeleter> values_;  // all of them, or the block in use
-  uint64_t num_values_ = 0;                       // in values_
+  Buffer buffer_;  // of all values, or of the block in use
   uint64_t block_begin_ = 0;
   uint64_t block_size_ = 0;
+  Buffer written_;                     // the block before, which writing_ reads
+  std::future<absl::Status> writing_;  // the last member: its destructor waits
 };
 
 }  // namespace tessera

@@ -154,7 +154,7 @@ absl::StatusOr<Material> EncodeWith(const Model& model, BtfSource& source, const
       const std::unique_ptr<CoefficientStore> store,
       CoefficientStore::Create(values_per_row * info.height, coefficient_budget, params.spill_folder));
   const uint64_t block_bytes =
-      store->is_spilled() ? sample_row_bytes + coefficient_row_bytes : sample_row_bytes;
+      store->is_spilled() ? sample_row_bytes + 2 * coefficient_row_bytes : sample_row_bytes;
   const uint64_t held_bytes = store->is_spilled() ? 0 : coefficient_row_bytes * info.height;
   const int rows_per_block = RowsWithin(std::min(params.memory_budget_bytes - held_bytes, kMaxRowBlockBytes),
                                         block_bytes, info.height);
