@@ -14,13 +14,13 @@
 
 #include "btf/base/parallel.h"
 #include "btf/base/status_macros.h"
+#include "btf/codec/coefficient_store.h"
 #include "btf/codec/dfmf/angular_factors.h"
 #include "btf/codec/dfmf/dfmf_decoder.h"
 #include "btf/codec/dfmf/direction_grid.h"
 #include "btf/codec/dfmf/rank_choice.h"
 #include "btf/codec/dfmf/resample_choice.h"
 #include "btf/codec/dfmf/sample_matrix.h"
-#include "btf/codec/dsh/coefficient_store.h"
 #include "btf/codec/encoder_input.h"
 #include "btf/codec/quantize.h"
 #include "btf/codec/row_passes.h"
@@ -77,6 +77,7 @@ absl::StatusOr<Ranges> ProjectTexels(const SampleMatrix& matrix, const Spaces& s
     maxima = maxima.max(t.rowwise().maxCoeff().array());
     return store.EndWrite();
   }));
+  TESSERA_RETURN_IF_ERROR(store.Finish());
   return Ranges{{minima.begin(), minima.end()}, {maxima.begin(), maxima.end()}};
 }
 
@@ -139,11 +140,12 @@ absl::Status QuantizeTexels(CoefficientStore& store, const Ranges& ranges, Eigen
   table.num_coefficients = static_cast<int>(k);
   TESSERA_ASSIGN_OR_RETURN(table.codes, CreateCodes(num_texels * k, params));
   constexpr uint64_t kTexelsPerBlock = 1 << 14;
+  std::vector<float> scratch;
   for (uint64_t begin = 0; begin < num_texels; begin += kTexelsPerBlock) {
     TESSERA_RETURN_IF_ERROR(context.CheckStop());
     const uint64_t count = std::min(kTexelsPerBlock, num_texels - begin);
     TESSERA_ASSIGN_OR_RETURN(const std::span<const float> values,
-                             store.Read(begin * candidates, count * candidates));
+                             store.Read(begin * candidates, count * candidates, scratch));
     constexpr int64_t kTexelsPerTask = 512;
     ParallelFor(context, 0, static_cast<int64_t>(count), kTexelsPerTask, [&](int64_t first, int64_t last) {
       std::vector<float> chosen(k);

@@ -17,7 +17,7 @@
 
 #include "btf/base/parallel.h"
 #include "btf/base/status_macros.h"
-#include "btf/codec/dsh/coefficient_store.h"
+#include "btf/codec/coefficient_store.h"
 #include "btf/codec/dsh/dsh_basis.h"
 #include "btf/codec/dsh/dsh_fitter.h"
 #include "btf/codec/encoder_input.h"
@@ -181,6 +181,7 @@ absl::StatusOr<Material> EncodeWith(const Model& model, BtfSource& source, const
     }
     TESSERA_RETURN_IF_ERROR(store->EndWrite());
   }
+  TESSERA_RETURN_IF_ERROR(store->Finish());
   sample_buffer.reset();
   context.Report("encode", info.height, info.height, "rows");
 
@@ -199,21 +200,7 @@ absl::StatusOr<Material> EncodeWith(const Model& model, BtfSource& source, const
   table.lights = info.lights;
   Quantisation quantisation = UniformQuantisation(ranges.minima, ranges.maxima);
   TESSERA_ASSIGN_OR_RETURN(table.codes, CreateCodes(values_per_row * info.height, params));
-  for (int row = 0; row < info.height; row += rows_per_block) {
-    TESSERA_RETURN_IF_ERROR(context.CheckStop());
-    const size_t begin = values_per_row * row;
-    const size_t count = values_per_row * std::min(rows_per_block, info.height - row);
-    TESSERA_ASSIGN_OR_RETURN(const std::span<const float> values, store->Read(begin, count));
-    constexpr int64_t kTexelsPerTask = 64;
-    ParallelFor(context, 0, static_cast<int64_t>(count / k), kTexelsPerTask,
-                [&](int64_t first, int64_t last) {
-                  const size_t size = static_cast<size_t>(last - first) * k;
-                  Quantize(quantisation, values.subspan(first * k, size),
-                           std::span(table.codes).subspan(begin + first * k, size));
-                });
-    table.codes.DropPages();
-  }
-  TESSERA_RETURN_IF_ERROR(context.CheckStop());
+  TESSERA_RETURN_IF_ERROR(QuantizeAll(*store, quantisation, table.codes, context));
   table.offset = std::move(quantisation.offset);
   table.step = std::move(quantisation.step);
   return material;

@@ -4,7 +4,7 @@
 //   TESSERA_ASSIGN_OR_RETURN(auto store, CoefficientStore::Create(num_values, budget_bytes, spill_folder));
 //   std::span<float> block = store->BeginWrite(begin, count);  // fill it, then
 //   TESSERA_RETURN_IF_ERROR(store->EndWrite());
-//   TESSERA_ASSIGN_OR_RETURN(std::span<const float> values, store->Read(begin, count));
+//   TESSERA_RETURN_IF_ERROR(QuantizeAll(*store, quantisation, codes, context));
 #pragma once
 
 #include <cstdint>
@@ -14,11 +14,15 @@
 #include <memory>
 #include <optional>
 #include <span>
+#include <vector>
 
 #include <absl/status/status.h>
 #include <absl/status/statusor.h>
 
+#include "btf/base/run_context.h"
 #include "btf/base/spill_file.h"
+#include "btf/codec/code_buffer.h"
+#include "btf/codec/quantize.h"
 
 namespace tessera {
 
@@ -43,8 +47,13 @@ class CoefficientStore {
   // A spilled block is written while the next one is filled: there are two in memory. Errors:
   // SpillFile::Write's, of this block or the one before.
   [[nodiscard]] absl::Status EndWrite();
-  // The values written there; the span is valid until the next call. Errors: SpillFile::Read's.
-  [[nodiscard]] absl::StatusOr<std::span<const float>> Read(uint64_t begin, uint64_t count);
+  // Ends writing: what was written may be read. Errors: SpillFile::Write's, of the last block.
+  [[nodiscard]] absl::Status Finish();
+
+  // Values [begin, begin + count), in `scratch` where they come from the file. Thread-safe. Errors:
+  // SpillFile::Read's.
+  [[nodiscard]] absl::StatusOr<std::span<const float>> Read(uint64_t begin, uint64_t count,
+                                                            std::vector<float>& scratch) const;
 
  private:
   CoefficientStore() = default;
@@ -57,9 +66,6 @@ class CoefficientStore {
     std::span<float> Resize(uint64_t count);
   };
 
-  // Until the block before is written.
-  absl::Status Wait();
-
   std::optional<SpillFile> file_;
   Buffer buffer_;  // of all values, or of the block in use
   uint64_t block_begin_ = 0;
@@ -67,5 +73,9 @@ class CoefficientStore {
   Buffer written_;                     // the block before, which writing_ reads
   std::future<absl::Status> writing_;  // the last member: its destructor waits
 };
+
+// The codes of all values of a finished store, as many as `codes` has. Errors: Read's; CANCELLED.
+[[nodiscard]] absl::Status QuantizeAll(const CoefficientStore& store, const Quantisation& quantisation,
+                                       CodeBuffer& codes, const RunContext& context);
 
 }  // namespace tessera
