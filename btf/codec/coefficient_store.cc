@@ -62,10 +62,11 @@ absl::Status CoefficientStore::EndWrite() {
   }
   TESSERA_RETURN_IF_ERROR(Finish());
   std::swap(buffer_, written_);
-  writing_ = std::async(std::launch::async, [this, offset = block_begin_ * sizeof(float),
-                                             block = std::span(written_.values.get(), block_size_)] {
-    return file_->Write(offset, std::as_bytes(block));
-  });
+  // Where there is no thread to be had, Finish() writes.
+  writing_ = std::async(
+      [this, offset = block_begin_ * sizeof(float), block = std::span(written_.values.get(), block_size_)] {
+        return file_->Write(offset, std::as_bytes(block));
+      });
   return absl::OkStatus();
 }
 

@@ -42,7 +42,7 @@ void ClsSolver<Scalar>::Shrink(const Eigen::Ref<const Vector>& energies,
   assert(projected.cols() == n && projected.rows() == energies.size() && projected.rows() % kLanes == 0);
   const Scalar floor = static_cast<Scalar>(kLambdaFloor) * eigenvalues_.maxCoeff();
   const Scalar tiny = std::numeric_limits<Scalar>::min();
-  // Newton roughly doubles the correct digits once close; from the bound below 4 to 6 steps are typical.
+  // Newton roughly doubles the correct digits once close.
   constexpr int kMaxSteps = 40;
 
   for (Eigen::Index row = 0; row < projected.rows(); row += kLanes) {

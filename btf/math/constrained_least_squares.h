@@ -33,8 +33,8 @@ class ClsSolver {
   static constexpr double kLambdaFloor = sizeof(Scalar) == 4 ? 1e-6 : 1e-14;
   // Newton stops when |c|^2 exceeds E by less than this share.
   static constexpr double kEnergyTolerance = sizeof(Scalar) == 4 ? 1e-5 : 1e-12;
-  // Signals are processed in groups of this size; Shrink wants padded rows. Enough for the sums of one half
-  // to hide the latency of the other.
+  // Signals are processed in groups of this size, enough to hide the latency of their sums; Shrink wants
+  // padded rows.
   static constexpr int kLanes = 32;
 
   // basis [M][n], both >= 1, finite and not all zero; M < n is fine. Cost n^3.

@@ -118,7 +118,7 @@ void AddTables(const Spaces& spaces, const Choice& choice, int64_t num_views, in
 }
 
 // The chosen coefficients of every texel, quantised into table.codes.
-absl::Status QuantizeTexels(CoefficientStore& store, const Ranges& ranges, Eigen::Index luma_candidates,
+absl::Status QuantizeTexels(const CoefficientStore& store, const Ranges& ranges, Eigen::Index luma_candidates,
                             const Ranks& ranks, uint64_t num_texels, const EncodeParams& params,
                             BtfelTable& table, const RunContext& context) {
   const size_t candidates = ranges.minima.size();
