@@ -39,8 +39,8 @@ enum class PaperSize {
 
 // Runs the paper's codec, "dsh-cls", and ours, "dsh" with as many coefficients and "dfmf" as it comes, on
 // BTFs of the rows' sizes: "generated:reactdiffuse" of 128 x 128 texels, whose field has no end, repeated.
-// All rows are streamed within the default memory budget. Minutes on two cores for kWithoutLargest, tens of
-// them for kAll. Progress in "encodings". Errors: those of GenerateBtf and of Encode; CANCELLED.
+// All rows are streamed within the default memory budget. Half a minute on two cores for kWithoutLargest,
+// minutes for kAll. Progress in "encodings". Errors: those of GenerateBtf and of Encode; CANCELLED.
 [[nodiscard]] absl::StatusOr<std::vector<PaperRow>> RunPaperTable(PaperSize size, const RunContext& context);
 
 // One row each row of the table and method, the paper's figures as method "paper".

@@ -29,7 +29,7 @@ constexpr char kStyle[] = R"(
 th { position: sticky; top: 0; }
 tr.case td { border-top: 2px solid #888; }
 tr.no td { background: #fbe3df; }
-td.says { max-width: 42em; color: #444; }
+td.says { min-width: 24em; max-width: 42em; color: #444; }
 )";
 
 std::string Figure(const std::optional<double>& value) {

@@ -232,7 +232,7 @@ void AddChartCommand(CLI::App& app, Session& session) {
   command->add_flag("--quick", flags->quick, "Few settings, on the middle 64x64 texels: under a minute");
   command->add_flag("--paper", flags->paper,
                     "Table II of Leung et al. 2007, ours beside it, up to 256x256 texels");
-  command->add_flag("--paper-largest", flags->paper_largest, "The same with its 800x800 rows: half an hour");
+  command->add_flag("--paper-largest", flags->paper_largest, "The same with its 800x800 rows: minutes more");
   command->add_option("--layout", flags->layout, "How the images of folders and files are laid out")
       ->check(CLI::IsMember({"auto", "ubo2003", "manifest", "exr"}))
       ->capture_default_str();

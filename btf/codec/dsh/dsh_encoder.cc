@@ -224,18 +224,21 @@ struct RidgeTexels {
 absl::StatusOr<RidgeTexels> ReadRidgeTexels(BtfSource& source, const RunContext& context) {
   constexpr int kRidgeRows = 8;
   constexpr int kRidgeTexels = 32;
+  constexpr size_t kMaxRidgeSamples = size_t{64} << 18;  // 64 MiB
   const BtfInfo& info = source.info();
   const int num_rows = std::min(kRidgeRows, info.height);
-  const int texels_per_row = std::min(kRidgeTexels, info.width);
   const auto spread = [](int64_t i, int64_t count, int64_t extent) {
     return (2 * i + 1) * extent / (2 * count);
   };
   RunContext source_context = context;
   source_context.progress = nullptr;
-  RidgeTexels texels{.count = int64_t{num_rows} * texels_per_row,
-                     .num_lights = static_cast<Eigen::Index>(info.lights.size()),
+  RidgeTexels texels{.num_lights = static_cast<Eigen::Index>(info.lights.size()),
                      .num_signals = static_cast<Eigen::Index>(3 * info.views.size())};
   const size_t samples_per_texel = static_cast<size_t>(texels.num_lights * texels.num_signals);
+  const size_t affordable = std::max<size_t>(1, kMaxRidgeSamples / (samples_per_texel * num_rows));
+  const int texels_per_row =
+      static_cast<int>(std::min<size_t>(affordable, std::min(kRidgeTexels, info.width)));
+  texels.count = int64_t{num_rows} * texels_per_row;
   // Not zeroed, they are filled.
   texels.samples = std::make_unique_for_overwrite<float[]>(samples_per_texel * texels.count);
   const auto row_buffer = std::make_unique_for_overwrite<float[]>(source.SamplesPerRow());
