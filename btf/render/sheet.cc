@@ -26,6 +26,35 @@ absl::Status CheckDirection(const char* name, const Direction& direction) {
   return absl::OkStatus();
 }
 
+// Linear RGB of a seam's heat: piecewise linear between the colours that sheet.h names.
+std::array<float, 3> ColourOfHeat(uint8_t heat) {
+  constexpr int kNumStops = 4;
+  constexpr std::array<float, kNumStops> kHeats = {64.0f, 80.0f, 96.0f, 128.0f};
+  constexpr std::array<std::array<float, 3>, kNumStops> kColours = {
+      {{0.03f, 0.1f, 0.9f}, {0.02f, 0.7f, 0.1f}, {0.9f, 0.8f, 0.02f}, {0.9f, 0.02f, 0.02f}}};
+  const float value = std::clamp(static_cast<float>(heat), kHeats.front(), kHeats.back());
+  int stop = 0;
+  while (stop + 2 < kNumStops && value > kHeats[stop + 1]) {
+    ++stop;
+  }
+  const float share = (value - kHeats[stop]) / (kHeats[stop + 1] - kHeats[stop]);
+  std::array<float, 3> colour{};
+  for (int channel = 0; channel < 3; ++channel) {
+    colour[channel] = std::lerp(kColours[stop][channel], kColours[stop + 1][channel], share);
+  }
+  return colour;
+}
+
+// `rgb` under its seams.
+std::array<float, 3> WithHeat(const float* rgb, uint8_t heat) {
+  if (heat > 0) {
+    return ColourOfHeat(heat);
+  }
+  constexpr float kDimmed = 0.3f;
+  const float grey = kDimmed * (rgb[0] + rgb[1] + rgb[2]) / 3.0f;
+  return {grey, grey, grey};
+}
+
 }  // namespace
 
 absl::StatusOr<Image> RenderTileSheet(const TileSet& tile_set, const SheetParams& params,
@@ -45,12 +74,16 @@ absl::StatusOr<Image> RenderTileSheet(const TileSet& tile_set, const SheetParams
     return absl::InvalidArgumentError(absl::StrCat("a tile set of ", num_tiles, " tiles of ", w,
                                                    " texels has ", tile_set.tile_index.size(), " texels"));
   }
+  if (params.seam_heat && tile_set.seam_heat.size() != tile_set.tile_index.size()) {
+    return absl::InvalidArgumentError("the tile set does not hold the heat of its seams: certify it again");
+  }
   const int64_t columns = params.columns > 0
                               ? params.columns
                               : static_cast<int64_t>(std::ceil(std::sqrt(static_cast<double>(num_tiles))));
   const int64_t rows = (num_tiles + columns - 1) / columns;
   const int64_t pitch = w + params.gap;
-  const int64_t width = columns * pitch + params.gap;
+  const int64_t heat_offset = columns * pitch;
+  const int64_t width = (params.seam_heat ? 2 : 1) * columns * pitch + params.gap;
   const int64_t height = rows * pitch + params.gap;
   if (width * height > kMostPixels) {
     return absl::InvalidArgumentError(
@@ -94,6 +127,11 @@ absl::StatusOr<Image> RenderTileSheet(const TileSet& tile_set, const SheetParams
         float* pixel = sheet.at(static_cast<int>(left) + x, static_cast<int>(top) + y);
         std::copy_n(values[size_t{BtfelOfTexel(texel)} * 4 + TurnsOfTexel(texel)].begin(), 3, pixel);
         pixel[3] = 1.0f;
+        if (params.seam_heat) {
+          float* const beside = sheet.at(static_cast<int>(heat_offset + left) + x, static_cast<int>(top) + y);
+          std::ranges::copy(WithHeat(pixel, tile_set.seam_heat[(tile * w + y) * w + x]), beside);
+          beside[3] = 1.0f;
+        }
       }
     }
   }

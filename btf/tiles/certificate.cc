@@ -1,38 +1,57 @@
 #include "btf/tiles/certificate.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <map>
 #include <memory>
-#include <utility>
 
+#include <absl/strings/str_cat.h>
+#include <absl/strings/str_format.h>
 #include <Eigen/Core>
 
 #include "btf/base/parallel.h"
+#include "btf/base/rng.h"
 #include "btf/base/status_macros.h"
+#include "btf/codec/codec.h"
 #include "btf/codec/decoder.h"
+#include "btf/math/conventions.h"
+#include "btf/tiles/repetition.h"
+#include "btf/tiles/seam_controls.h"
 #include "btf/tiles/tile_sides.h"
 
 namespace tessera {
 namespace {
 
-constexpr int kRunLength = 8;
 constexpr double kEpsilonShare = 0.01;  // of the mean exemplar gradient
 constexpr double kPercentile = 0.95;
+constexpr int kStrata = 16;  // of views and of lights
+static_assert(kStrata * kStrata == kCertificateImages);
+constexpr int kImagesAtOnce = 8;
 constexpr int kTexelsPerBlock = 256;
-// Recorded angles are rounded, since 15 degrees do not survive radians.
-constexpr double kAnglesPerDegree = 1e6;
-
-double RecordedDeg(double rad) {
-  return std::round(DegFromRad(rad) * kAnglesPerDegree) / kAnglesPerDegree;
-}
+constexpr int kPairsPerBlock = 1024;
 
 float Difference(const ExemplarImage& image, uint32_t a, uint32_t b) {
   const float* const p = image.rgb[TurnsOfTexel(a)].data() + size_t{3} * BtfelOfTexel(a);
   const float* const q = image.rgb[TurnsOfTexel(b)].data() + size_t{3} * BtfelOfTexel(b);
   return std::sqrt((p[0] - q[0]) * (p[0] - q[0]) + (p[1] - q[1]) * (p[1] - q[1]) +
                    (p[2] - q[2]) * (p[2] - q[2]));
+}
+
+// The mean distance of neighbours in an image of the exemplar.
+double MeanGradient(const Exemplar& exemplar, const ExemplarImage& image) {
+  double gradient = 0.0;
+  int64_t count = 0;
+  const int turn = image.rgb[0].empty() ? 3 : 0;  // any turn of the exemplar has the same neighbours
+  for (int pixel = 0; pixel < exemplar.num_pixels(); ++pixel) {
+    const uint32_t texel = PackTexel(static_cast<uint32_t>(pixel), turn);
+    for (const int direction : {GridCut::kRight, GridCut::kDown}) {
+      if (const uint32_t beside = exemplar.Step(texel, direction); beside != kNoTexel) {
+        gradient += Difference(image, texel, beside);
+        ++count;
+      }
+    }
+  }
+  return gradient / static_cast<double>(std::max<int64_t>(1, count));
 }
 
 // The nearest-rank percentile; 1 for none.
@@ -46,72 +65,122 @@ double Percentile95(std::vector<double> values) {
   return values[rank];
 }
 
-}  // namespace
+// Notes the full runs among the pairs from `first_pair` on.
+void AddRuns(Seams& seams, size_t first_pair) {
+  for (size_t start = first_pair; start + kSeamRun <= seams.pairs.size(); start += kSeamRun) {
+    seams.run_starts.push_back(start);
+  }
+}
 
-CertificateBuilder::CertificateBuilder(const Exemplar& exemplar, const Arrangement& arrangement,
-                                       const IndexMaps& maps)
-    : exemplar_(&exemplar) {
-  CollectInsides(maps);
-  CollectBorders(arrangement, maps);
-  for (Part* const part : {&borders_, &insides_}) {
-    part->by_run.resize(part->num_runs);
-    for (const CutPair& pair : part->pairs) {
-      part->num_cut += pair.weight;
+// Element `i` of `count` equal parts of 0..extent-1.
+int DrawFromPart(int i, int count, int extent, uint64_t draw) {
+  const int begin = static_cast<int>(int64_t{i} * extent / count);
+  const int end = static_cast<int>(int64_t{i + 1} * extent / count);
+  return begin + static_cast<int>(draw % static_cast<uint64_t>(end - begin));
+}
+
+double ReferencedShare(const Exemplar& exemplar, const IndexMaps& maps) {
+  std::vector<bool> referenced(exemplar.num_pixels(), false);
+  for (const uint32_t texel : maps.texels) {
+    referenced[BtfelOfTexel(texel)] = true;
+  }
+  return static_cast<double>(std::ranges::count(referenced, true)) / exemplar.num_pixels();
+}
+
+// As Certificate::heat.
+std::vector<uint8_t> HeatOf(std::span<const SeamMeter* const> meters, size_t num_texels) {
+  std::vector<SeamMeter::Sums> sums(num_texels);
+  for (const SeamMeter* const meter : meters) {
+    for (const auto& [pair, texel] : meter->seams().places) {
+      sums[texel].step += meter->of_pair(pair).step;
+      sums[texel].natural += meter->of_pair(pair).natural;
     }
   }
-}
-
-// Numbers the full runs among the pairs from `first_pair` on.
-void CertificateBuilder::AssignRun(Part& part, size_t first_pair) {
-  const size_t num_full = (part.pairs.size() - first_pair) / kRunLength * kRunLength;
-  for (size_t i = 0; i < num_full; ++i) {
-    part.pairs[first_pair + i].run = part.num_runs + static_cast<int>(i / kRunLength);
+  std::vector<uint8_t> heat(num_texels, 0);
+  for (size_t i = 0; i < num_texels; ++i) {
+    if (sums[i].natural > 0.0) {
+      heat[i] = static_cast<uint8_t>(std::clamp(std::round(kHeatOfOne * sums[i].ratio()), 1.0, 255.0));
+    }
   }
-  part.num_runs += static_cast<int>(num_full / kRunLength);
+  return heat;
 }
 
-void CertificateBuilder::CollectInsides(const IndexMaps& maps) {
+}  // namespace
+
+std::vector<ImagePair> ChooseImages(int num_views, int num_lights, CertificateImages which) {
+  std::vector<ImagePair> images;
+  int view_parts = num_views;
+  int light_parts = num_lights;
+  if (which == CertificateImages::kStratified && int64_t{num_views} * num_lights > kCertificateImages) {
+    const auto parts_beside = [](int others) { return (kCertificateImages + others - 1) / others; };
+    light_parts = std::min(num_lights, parts_beside(std::min(kStrata, num_views)));
+    view_parts = std::min(num_views, parts_beside(light_parts));
+  }
+  for (int i = 0; i < view_parts; ++i) {
+    for (int j = 0; j < light_parts; ++j) {
+      const uint64_t draw = Mix64(static_cast<uint64_t>(i), static_cast<uint64_t>(j));
+      images.push_back({DrawFromPart(i, view_parts, num_views, draw >> 32),
+                        DrawFromPart(j, light_parts, num_lights, draw & 0xffffffffu)});
+    }
+  }
+  return images;
+}
+
+Seams InsideSeams(const Exemplar& exemplar, const IndexMaps& maps) {
+  Seams seams;
   const int size = maps.tile_size;
-  const int num_tiles = static_cast<int>(maps.texels.size() / (static_cast<size_t>(size) * size));
+  const auto area = static_cast<size_t>(size) * size;
+  const int num_tiles = static_cast<int>(maps.texels.size() / area);
   for (int tile = 0; tile < num_tiles; ++tile) {
     // Pairs side by side are walked down their columns, pairs one above the other along their rows: along the
     // seam.
     for (const bool down : {false, true}) {
       const int direction = down ? GridCut::kDown : GridCut::kRight;
-      const size_t first_pair = insides_.pairs.size();
+      const size_t first_pair = seams.pairs.size();
+      // Texel i of line `line`.
+      const auto index = [&](int line, int i) {
+        return tile * area +
+               (down ? static_cast<size_t>(line) * size + i : static_cast<size_t>(i) * size + line);
+      };
       for (int line = 0; line + 1 < size; ++line) {
         for (int i = 0; i < size; ++i) {
-          const uint32_t a = down ? maps.texel(tile, i, line) : maps.texel(tile, line, i);
-          const uint32_t b = down ? maps.texel(tile, i, line + 1) : maps.texel(tile, line + 1, i);
-          insides_.num_pairs += 1.0;
-          if (exemplar_->Step(a, direction) != b) {
-            insides_.pairs.push_back({a, b, direction});
+          const uint32_t a = maps.texels[index(line, i)];
+          const uint32_t b = maps.texels[index(line + 1, i)];
+          seams.num_pairs += 1.0;
+          if (exemplar.Step(a, direction) != b) {
+            const auto pair = static_cast<uint32_t>(seams.pairs.size());
+            seams.places.emplace_back(pair, index(line, i));
+            seams.places.emplace_back(pair, index(line + 1, i));
+            seams.pairs.push_back({a, b, direction});
           }
         }
       }
-      AssignRun(insides_, first_pair);
-      for (int line = 0; line < size; ++line) {
+      AddRuns(seams, first_pair);
+      for (int i = 0; i < size; ++i) {
         int run = 1;
-        for (int i = 1; i <= size; ++i) {
-          insides_.longest_run = std::max(insides_.longest_run, run);
-          if (i == size) {
+        for (int line = 1; line <= size; ++line) {
+          seams.longest_run = std::max(seams.longest_run, run);
+          if (line == size) {
             break;
           }
-          const uint32_t a = down ? maps.texel(tile, line, i - 1) : maps.texel(tile, i - 1, line);
-          const uint32_t b = down ? maps.texel(tile, line, i) : maps.texel(tile, i, line);
-          run = exemplar_->Step(a, direction) == b ? run + 1 : 1;
+          const bool goes_on =
+              exemplar.Step(maps.texels[index(line - 1, i)], direction) == maps.texels[index(line, i)];
+          run = goes_on ? run + 1 : 1;
         }
       }
     }
   }
+  return seams;
 }
 
-void CertificateBuilder::CollectBorders(const Arrangement& arrangement, const IndexMaps& maps) {
+Seams BorderSeams(const Exemplar& exemplar, const Arrangement& arrangement, const IndexMaps& maps) {
+  Seams seams;
   const int size = maps.tile_size;
   // All '+' and all '-' sides by strip, as (tile, side). A '+' side shows the strip turned by `side`, a '-'
   // side by side + 2; turned back, the '+' tile lies above the '-' tile.
+  using Side = std::pair<int, int>;
   for (int strip = 0; strip < NumStrips(arrangement); ++strip) {
-    std::array<std::vector<std::pair<int, int>>, 2> sides_by_sign;
+    std::array<std::vector<Side>, 2> sides_by_sign;
     for (int tile = 0; tile < static_cast<int>(arrangement.codes.size()); ++tile) {
       const TileSides sides = SidesFromTileCode(arrangement.codes[tile]);
       for (int side = 0; side < 4; ++side) {
@@ -124,126 +193,151 @@ void CertificateBuilder::CollectBorders(const Arrangement& arrangement, const In
     if (plus.empty() || minus.empty()) {
       continue;
     }
-    const auto border_texel = [&](const std::pair<int, int>& at, Sign sign, int x) {
+    const auto index = [&](const Side& at, Sign sign, int x) {
       const int along = sign == Sign::kPlus ? x : size - 1 - x;
       const auto [column, row] = TilePixelAt(at.second, along, 0, size);
+      return (static_cast<size_t>(at.first) * size + row) * size + column;
+    };
+    const auto border_texel = [&](const Side& at, Sign sign, int x) {
       const int shown = sign == Sign::kPlus ? at.second : at.second + 2;
-      return TurnTexel(maps.texel(at.first, column, row), 4 - (shown & 3));
+      return TurnTexel(maps.texels[index(at, sign, x)], 4 - (shown & 3));
+    };
+    const auto add_place = [&](const Side& at, Sign sign, int x) {
+      seams.places.emplace_back(seams.pairs.size(), index(at, sign, x));
     };
     const double weight = static_cast<double>(plus.size()) * static_cast<double>(minus.size());
-    const size_t first_pair = borders_.pairs.size();
+    const size_t first_pair = seams.pairs.size();
     int run = 0;
     uint32_t previous_a = kNoTexel;
     for (int x = 1; x + 1 < size; ++x) {
       const uint32_t a = border_texel(plus.front(), Sign::kPlus, x);
       const uint32_t b = border_texel(minus.front(), Sign::kMinus, x);
-      borders_.num_pairs += weight;
-      const bool cut = exemplar_->Step(a, GridCut::kDown) != b;
+      seams.num_pairs += weight;
+      const bool cut = exemplar.Step(a, GridCut::kDown) != b;
       if (cut) {
-        borders_.pairs.push_back({a, b, GridCut::kDown, weight});
+        for (const Side& at : plus) {
+          add_place(at, Sign::kPlus, x);
+        }
+        for (const Side& at : minus) {
+          add_place(at, Sign::kMinus, x);
+        }
+        seams.pairs.push_back({a, b, GridCut::kDown, weight});
       }
-      run = cut ? 0 : run > 0 && exemplar_->Step(previous_a, GridCut::kRight) == a ? run + 1 : 1;
-      borders_.longest_run = std::max(borders_.longest_run, run);
+      run = cut ? 0 : run > 0 && exemplar.Step(previous_a, GridCut::kRight) == a ? run + 1 : 1;
+      seams.longest_run = std::max(seams.longest_run, run);
       previous_a = a;
     }
-    AssignRun(borders_, first_pair);
+    AddRuns(seams, first_pair);
     // The texels at both ends depend on the tiles: all pairs, equal ones together.
     std::map<std::pair<uint32_t, uint32_t>, double> ends;
-    for (const auto& above : plus) {
-      for (const auto& below : minus) {
+    for (const Side& above : plus) {
+      for (const Side& below : minus) {
         for (const int x : {0, size - 1}) {
           ends[{border_texel(above, Sign::kPlus, x), border_texel(below, Sign::kMinus, x)}] += 1.0;
         }
       }
     }
     for (const auto& [texels, count] : ends) {
-      borders_.num_pairs += count;
-      if (exemplar_->Step(texels.first, GridCut::kDown) != texels.second) {
-        borders_.pairs.push_back({texels.first, texels.second, GridCut::kDown, count});
+      seams.num_pairs += count;
+      if (exemplar.Step(texels.first, GridCut::kDown) != texels.second) {
+        seams.pairs.push_back({texels.first, texels.second, GridCut::kDown, count});
       }
     }
   }
+  return seams;
 }
 
-void CertificateBuilder::Add(const ExemplarImage& image) {
-  double gradient = 0.0;
-  int64_t count = 0;
-  const int turn = image.rgb[0].empty() ? 3 : 0;  // any turn of the exemplar has the same neighbours
-  for (int pixel = 0; pixel < exemplar_->num_pixels(); ++pixel) {
-    const uint32_t texel = PackTexel(static_cast<uint32_t>(pixel), turn);
-    for (const int direction : {GridCut::kRight, GridCut::kDown}) {
-      if (const uint32_t beside = exemplar_->Step(texel, direction); beside != kNoTexel) {
-        gradient += Difference(image, texel, beside);
-        ++count;
-      }
-    }
-  }
-  gradient /= static_cast<double>(std::max<int64_t>(1, count));
-  const double epsilon = kEpsilonShare * gradient;
-  for (Part* const part : {&borders_, &insides_}) {
-    Sums total;
-    for (const CutPair& pair : part->pairs) {
+SeamMeter::SeamMeter(const Exemplar& exemplar, Seams seams)
+    : exemplar_(&exemplar), seams_(std::move(seams)), by_pair_(seams_.pairs.size()) {}
+
+void SeamMeter::Add(std::span<const ExemplarImage> images, const RunContext& context) {
+  std::vector<double> gradients(images.size());
+  ParallelFor(context, 0, static_cast<int64_t>(images.size()), 1,
+              [&](int64_t i, int64_t) { gradients[i] = MeanGradient(*exemplar_, images[i]); });
+  const auto num_pairs = static_cast<int64_t>(seams_.pairs.size());
+  const int64_t num_blocks = (num_pairs + kPairsPerBlock - 1) / kPairsPerBlock;
+  std::vector<Sums> by_block(num_blocks * images.size());
+  ParallelFor(context, 0, num_pairs, kPairsPerBlock, [&](int64_t begin, int64_t end) {
+    for (int64_t at = begin; at < end; ++at) {
+      const CutPair& pair = seams_.pairs[at];
       const uint32_t a_at_q = exemplar_->Step(pair.a, pair.direction);
       const uint32_t b_at_p = exemplar_->Step(pair.b, pair.direction ^ 2);
-      double natural = 0.0;
-      int known = 0;
-      if (a_at_q != kNoTexel) {
-        natural += Difference(image, pair.a, a_at_q);
-        ++known;
-      }
-      if (b_at_p != kNoTexel) {
-        natural += Difference(image, b_at_p, pair.b);
-        ++known;
-      }
-      natural = known > 0 ? natural / known : gradient;
-      const double step = Difference(image, pair.a, pair.b);
-      total.step += pair.weight * step;
-      total.natural += pair.weight * (natural + epsilon);
-      if (pair.run >= 0) {
-        part->by_run[pair.run].step += step;
-        part->by_run[pair.run].natural += natural + epsilon;
+      for (size_t i = 0; i < images.size(); ++i) {
+        const ExemplarImage& image = images[i];
+        double natural = 0.0;
+        int known = 0;
+        if (a_at_q != kNoTexel) {
+          natural += Difference(image, pair.a, a_at_q);
+          ++known;
+        }
+        if (b_at_p != kNoTexel) {
+          natural += Difference(image, b_at_p, pair.b);
+          ++known;
+        }
+        natural = known > 0 ? natural / known : gradients[i];
+        const double epsilon = kEpsilonShare * gradients[i];
+        const double step = Difference(image, pair.a, pair.b) + epsilon;
+        by_pair_[at].step += step;
+        by_pair_[at].natural += natural + epsilon;
+        Sums& sums = by_block[begin / kPairsPerBlock * images.size() + i];
+        sums.step += pair.weight * step;
+        sums.natural += pair.weight * (natural + epsilon);
       }
     }
-    part->by_image.push_back(total);
+  });
+  for (size_t i = 0; i < images.size(); ++i) {
+    Sums sums;
+    for (int64_t block = 0; block < num_blocks; ++block) {
+      sums.step += by_block[block * images.size() + i].step;
+      sums.natural += by_block[block * images.size() + i].natural;
+    }
+    by_image_.push_back(sums);
   }
-  images_.push_back({{"view_polar_deg", RecordedDeg(image.view.theta_rad)},
-                     {"view_azimuth_deg", RecordedDeg(image.view.phi_rad)},
-                     {"light_polar_deg", RecordedDeg(image.light.theta_rad)},
-                     {"light_azimuth_deg", RecordedDeg(image.light.phi_rad)}});
 }
 
-nlohmann::json CertificateBuilder::Describe(const Part& part) {
-  const auto ratio = [](const Sums& sums) { return sums.natural > 0.0 ? sums.step / sums.natural : 1.0; };
+double SeamMeter::Ratio() const {
   Sums pooled;
-  double worst = part.pairs.empty() ? 1.0 : 0.0;
-  std::vector<double> by_image;
-  for (const Sums& sums : part.by_image) {
+  for (const Sums& sums : by_image_) {
     pooled.step += sums.step;
     pooled.natural += sums.natural;
-    by_image.push_back(ratio(sums));
+  }
+  return pooled.ratio();
+}
+
+nlohmann::json SeamMeter::Describe() const {
+  double worst = seams_.pairs.empty() ? 1.0 : 0.0;
+  std::vector<double> by_image;
+  for (const Sums& sums : by_image_) {
+    by_image.push_back(sums.ratio());
     worst = std::max(worst, by_image.back());
   }
   std::vector<double> by_run;
-  for (const Sums& sums : part.by_run) {
-    by_run.push_back(ratio(sums));
+  for (const size_t start : seams_.run_starts) {
+    Sums run;
+    for (size_t pair = start; pair < start + kSeamRun; ++pair) {
+      run.step += by_pair_[pair].step;
+      run.natural += by_pair_[pair].natural;
+    }
+    by_run.push_back(run.ratio());
   }
-  const double cut_share = part.num_pairs > 0.0 ? part.num_cut / part.num_pairs : 0.0;
-  return {{"ratio", ratio(pooled)},
+  double num_cut = 0.0;
+  for (const CutPair& pair : seams_.pairs) {
+    num_cut += pair.weight;
+  }
+  const double cut_share = seams_.num_pairs > 0.0 ? num_cut / seams_.num_pairs : 0.0;
+  return {{"ratio", Ratio()},
           {"ratio_p95", Percentile95(std::move(by_image))},
           {"ratio_worst", worst},
           {"ratio_run_p95", Percentile95(std::move(by_run))},
           {"cut_share", cut_share},
           {"verbatim_share", 1.0 - cut_share},
-          {"longest_verbatim_run", part.longest_run}};
+          {"longest_verbatim_run", seams_.longest_run}};
 }
 
-nlohmann::json CertificateBuilder::Finish() const {
-  return {{"images", images_}, {"borders", Describe(borders_)}, {"insides", Describe(insides_)}};
-}
-
-absl::StatusOr<nlohmann::json> CertifyTiles(const Material& material, const Exemplar& exemplar,
-                                            const Arrangement& arrangement, const IndexMaps& maps,
-                                            const RunContext& context) {
+absl::StatusOr<Certificate> CertifyTiles(const Material& material, const Exemplar& exemplar,
+                                         const Arrangement& arrangement, const IndexMaps& maps,
+                                         int strip_height, CertificateImages which,
+                                         const RunContext& context) {
   TESSERA_ASSIGN_OR_RETURN(const std::unique_ptr<Decoder> decoder, MakeDecoder(material.btfels));
   std::array<bool, 4> turn_occurs = {true, false, false, false};
   for (const uint32_t texel : maps.texels) {
@@ -251,43 +345,112 @@ absl::StatusOr<nlohmann::json> CertifyTiles(const Material& material, const Exem
   }
   // Border pairs are looked at in the strip's frame, where texels of vertical strips in plane-* have turn 3.
   turn_occurs[3] = true;
-  std::vector<int> turns;
-  for (int turn = 0; turn < 4; ++turn) {
-    if (turn_occurs[turn]) {
-      turns.push_back(turn);
+  const std::vector<int> control_turns = TurnsOfInterior(arrangement);
+  for (const int turn : control_turns) {
+    turn_occurs[turn] = true;
+  }
+  RandomJoins joins = JoinAtRandom(exemplar, control_turns, strip_height);
+  // In the order of `figures` below.
+  std::vector<SeamMeter> meters;
+  meters.emplace_back(exemplar, BorderSeams(exemplar, arrangement, maps));
+  meters.emplace_back(exemplar, InsideSeams(exemplar, maps));
+  meters.emplace_back(exemplar, FalseCuts(exemplar, strip_height));
+  meters.emplace_back(exemplar, std::move(joins.minimum_cuts));
+  meters.emplace_back(exemplar, std::move(joins.straight_cuts));
+
+  const BtfelTable& table = material.btfels;
+  const size_t k = table.num_coefficients;
+  const std::vector<ImagePair> pairs =
+      ChooseImages(static_cast<int>(table.views.size()), static_cast<int>(table.lights.size()), which);
+  std::vector<ExemplarImage> images(std::min<size_t>(kImagesAtOnce, pairs.size()));
+  for (ExemplarImage& image : images) {
+    for (int turn = 0; turn < 4; ++turn) {
+      image.rgb[turn].resize(turn_occurs[turn] ? size_t{3} * exemplar.num_pixels() : 0);
     }
   }
-
-  CertificateBuilder builder(exemplar, arrangement, maps);
-  const size_t k = material.btfels.num_coefficients;
-  const int num_lights = static_cast<int>(kCertificateLights.size());
-  for (const auto& view_deg : kCertificateViews) {
-    const Direction view{RadFromDeg(view_deg[0]), RadFromDeg(view_deg[1])};
-    std::vector<ExemplarImage> images(num_lights);
-    for (int light = 0; light < num_lights; ++light) {
-      images[light].view = view;
-      images[light].light = {RadFromDeg(kCertificateLights[light][0]),
-                             RadFromDeg(kCertificateLights[light][1])};
-      for (const int turn : turns) {
-        images[light].rgb[turn].resize(size_t{3} * exemplar.num_pixels());
-      }
-    }
+  for (size_t first = 0; first < pairs.size(); first += images.size()) {
+    context.Report("certificate", static_cast<int64_t>(first), static_cast<int64_t>(pairs.size()), "images");
+    images.resize(std::min(images.size(), pairs.size() - first));
     ParallelFor(context, 0, exemplar.num_pixels(), kTexelsPerBlock, [&](int64_t begin, int64_t end) {
       const auto count = static_cast<size_t>(end - begin);
-      const std::span<const uint8_t> codes = std::span(material.btfels.codes).subspan(begin * k, count * k);
-      for (ExemplarImage& image : images) {
-        for (const int turn : turns) {
-          decoder->DecodeTexels(codes, VectorFromDirection(image.light), VectorFromDirection(view), turn,
-                                std::span(image.rgb[turn]).subspan(3 * begin, 3 * count));
+      const std::span<const uint8_t> codes = std::span(table.codes).subspan(begin * k, count * k);
+      for (size_t i = 0; i < images.size(); ++i) {
+        const Eigen::Vector3d light = VectorFromDirection(table.lights[pairs[first + i].light]);
+        const Eigen::Vector3d view = VectorFromDirection(table.views[pairs[first + i].view]);
+        for (int turn = 0; turn < 4; ++turn) {
+          if (turn_occurs[turn]) {
+            decoder->DecodeTexels(codes, light, view, turn,
+                                  std::span(images[i].rgb[turn]).subspan(3 * begin, 3 * count));
+          }
         }
       }
     });
     TESSERA_RETURN_IF_ERROR(context.CheckStop());
-    for (const ExemplarImage& image : images) {
-      builder.Add(image);
+    for (SeamMeter& meter : meters) {
+      meter.Add(images, context);
+    }
+    TESSERA_RETURN_IF_ERROR(context.CheckStop());
+  }
+  TESSERA_ASSIGN_OR_RETURN(nlohmann::json repetition,
+                           MeasureRepetition(exemplar, arrangement, maps, strip_height, context));
+  context.Report("certificate", static_cast<int64_t>(pairs.size()), static_cast<int64_t>(pairs.size()),
+                 "images");
+
+  Certificate certificate;
+  certificate.figures = {{"images",
+                          {{"count", pairs.size()},
+                           {"of", table.views.size() * table.lights.size()},
+                           {"rule", which == CertificateImages::kAll ? "all" : "stratified"}}},
+                         {"referenced_share", ReferencedShare(exemplar, maps)},
+                         {"borders", meters[0].Describe()},
+                         {"insides", meters[1].Describe()},
+                         {"controls",
+                          {{"false_cuts", meters[2].Ratio()},
+                           {"random_minimum_cuts", meters[3].Ratio()},
+                           {"random_straight_cuts", meters[4].Ratio()}}},
+                         {"repetition", std::move(repetition)}};
+  certificate.heat = HeatOf(std::array<const SeamMeter*, 2>{&meters[0], &meters[1]}, maps.texels.size());
+  return certificate;
+}
+
+absl::Status CertifyTileSet(const Material& material, CertificateImages which, const RunContext& context,
+                            TileSet& tile_set) {
+  const BtfelTable& own = tile_set.btfels;
+  const BtfelTable& exemplar_table = material.btfels;
+  if (tile_set.source_pixels.empty()) {
+    return absl::FailedPreconditionError(
+        "the tile set does not record where its BTFels lie in the exemplar: synthesise it again");
+  }
+  if (own.codec_id != exemplar_table.codec_id || own.num_coefficients != exemplar_table.num_coefficients ||
+      own.offset != exemplar_table.offset || own.step != exemplar_table.step) {
+    return absl::FailedPreconditionError("the material is not the one that the tile set was made of");
+  }
+  for (size_t i = 0; i < own.size(); ++i) {
+    const uint32_t pixel = tile_set.source_pixels[i];
+    if (pixel >= exemplar_table.size() || !std::ranges::equal(own.btfel(i), exemplar_table.btfel(pixel))) {
+      return absl::FailedPreconditionError(
+          absl::StrFormat("the material is not the one that the tile set was made of: BTFel %d is not its "
+                          "texel %d",
+                          i, pixel));
     }
   }
-  return builder.Finish();
+  const Codec* const codec = FindCodec(own.codec_id);
+  if (codec == nullptr) {
+    return absl::InvalidArgumentError(absl::StrCat("unknown codec '", own.codec_id, "'"));
+  }
+  TESSERA_ASSIGN_OR_RETURN(const Arrangement* const arrangement, FindArrangement(tile_set.arrangement_id));
+  IndexMaps maps{.tile_size = tile_set.tile_size};
+  maps.texels.reserve(tile_set.tile_index.size());
+  for (const uint32_t texel : tile_set.tile_index) {
+    maps.texels.push_back(PackTexel(tile_set.source_pixels[BtfelOfTexel(texel)], TurnsOfTexel(texel)));
+  }
+  TESSERA_ASSIGN_OR_RETURN(const Embedding embedding, codec->Embed(material, kCutDims, context));
+  TESSERA_ASSIGN_OR_RETURN(
+      Certificate certificate,
+      CertifyTiles(material, Exemplar(embedding), *arrangement, maps, tile_set.strip_height, which, context));
+  tile_set.certificate = std::move(certificate.figures);
+  tile_set.seam_heat = std::move(certificate.heat);
+  return absl::OkStatus();
 }
 
 }  // namespace tessera

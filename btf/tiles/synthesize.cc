@@ -28,6 +28,7 @@ double CapturedShare(const Embedding& embedding, int dims) {
 // The table of the BTFels that occur, in ascending exemplar order, and the index of each.
 struct Referenced {
   BtfelTable table;
+  std::vector<uint32_t> pixels;          // of each BTFel of the table
   std::vector<uint32_t> index_of_pixel;  // kNoTexel where unused
 };
 
@@ -47,10 +48,10 @@ Referenced KeepReferenced(const BtfelTable& exemplar, const std::vector<uint32_t
   table.parameters = exemplar.parameters;
   table.views = exemplar.views;
   table.lights = exemplar.lights;
-  uint32_t next = 0;
   for (size_t pixel = 0; pixel < referenced.index_of_pixel.size(); ++pixel) {
     if (referenced.index_of_pixel[pixel] != kNoTexel) {
-      referenced.index_of_pixel[pixel] = next++;
+      referenced.index_of_pixel[pixel] = static_cast<uint32_t>(referenced.pixels.size());
+      referenced.pixels.push_back(static_cast<uint32_t>(pixel));
       const auto codes = exemplar.btfel(pixel);
       table.codes.insert(table.codes.end(), codes.begin(), codes.end());
     }
@@ -137,14 +138,17 @@ absl::StatusOr<TileSet> SynthesizeTileSet(const Material& material, const Arrang
   set.radiometry = material.radiometry;
   Referenced referenced = KeepReferenced(material.btfels, maps.texels);
   set.btfels = std::move(referenced.table);
+  set.source_pixels = std::move(referenced.pixels);
   set.tile_index.reserve(maps.texels.size());
   for (const uint32_t texel : maps.texels) {
     set.tile_index.push_back(PackTexel(referenced.index_of_pixel[BtfelOfTexel(texel)], TurnsOfTexel(texel)));
   }
 
-  context.Report("certificate", 0, 1, "sets");
-  TESSERA_ASSIGN_OR_RETURN(set.certificate, CertifyTiles(material, exemplar, arrangement, maps, context));
-  context.Report("certificate", 1, 1, "sets");
+  TESSERA_ASSIGN_OR_RETURN(Certificate certificate,
+                           CertifyTiles(material, exemplar, arrangement, maps, params.strip_height,
+                                        CertificateImages::kStratified, context));
+  set.certificate = std::move(certificate.figures);
+  set.seam_heat = std::move(certificate.heat);
 
   set.metadata = DescribeReports(maps);
   set.metadata["seed"] = params.seed;
@@ -154,7 +158,6 @@ absl::StatusOr<TileSet> SynthesizeTileSet(const Material& material, const Arrang
                                 {"texel_threshold", params.texel_threshold},
                                 {"force", params.force}};
   set.metadata["exemplar"] = {{"width", material.width}, {"height", material.height}};
-  set.metadata["referenced_share"] = static_cast<double>(set.btfels.size()) / static_cast<double>(num_pixels);
   set.metadata["captured_variance"] = {{"search_dims", exemplar.search_dims()},
                                        {"search_share", CapturedShare(embedding, kSearchDims)},
                                        {"cut_dims", std::min(embedding.dims, kCutDims)},

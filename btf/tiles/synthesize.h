@@ -34,12 +34,13 @@ struct SynthesisParams {
 // Every texel of the result is a BTFel of `material` with a turn (0 throughout for "plane-*"); the table
 // keeps the referenced BTFels in ascending exemplar order. Same material, arrangement and parameters give the
 // same bytes for any number of threads. Metadata: seed, parameters, anisotropy, captured variance, thresholds
-// and what was reached, referenced share; certificate: see certificate.h.
+// and what was reached; certificate: see certificate.h.
 //
 // Errors, with reasons as in btf/base/reason.h: INVALID_ARGUMENT naming the size and its limit (reason
 // MATERIAL_TOO_SMALL when the exemplar is the cause) or an unknown codec; FAILED_PRECONDITION with reason
 // NOT_ISOTROPIC (turned strips only, unless forced) or THRESHOLD_NOT_REACHED (unless forced), each with its
-// figures; CANCELLED within one patch search. Progress: stages "corners", "strips" and "tiles".
+// figures; CANCELLED within one patch search. Progress: stages "corners", "strips", "tiles" and
+// "certificate".
 [[nodiscard]] absl::StatusOr<TileSet> SynthesizeTileSet(const Material& material,
                                                         const Arrangement& arrangement,
                                                         const SynthesisParams& params,

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <functional>
 
 #include <absl/strings/str_cat.h>
 
@@ -55,6 +56,17 @@ absl::Status CheckTiles(const TileSet& tile_set) {
                        ") names BTFel ", BtfelOfTexel(tile_set.tile_index[i]), "; there are ", num_btfels));
     }
   }
+  if (!tile_set.seam_heat.empty() && tile_set.seam_heat.size() != texels) {
+    return absl::InvalidArgumentError(absl::StrCat("section 'seam_heat': ", tile_set.seam_heat.size(),
+                                                   " texels, 'tile_index' has ", texels));
+  }
+  const std::vector<uint32_t>& sources = tile_set.source_pixels;
+  if (!sources.empty() && (sources.size() != num_btfels ||
+                           std::ranges::adjacent_find(sources, std::greater_equal()) != sources.end())) {
+    return absl::InvalidArgumentError(absl::StrCat("section 'source_pixels': ", sources.size(),
+                                                   " pixels for ", num_btfels,
+                                                   " BTFels, or not strictly ascending"));
+  }
   return absl::OkStatus();
 }
 
@@ -95,6 +107,14 @@ absl::StatusOr<std::string> SerializeTileSet(const TileSet& tile_set) {
   container.sections.push_back(MakeSection<uint32_t>("tile_index",
                                                      {tiles, tile_set.tile_size, tile_set.tile_size},
                                                      std::span<const uint32_t>(tile_set.tile_index)));
+  if (!tile_set.source_pixels.empty()) {
+    container.sections.push_back(MakeSection<uint32_t>(
+        "source_pixels", {static_cast<int64_t>(tile_set.source_pixels.size())}, tile_set.source_pixels));
+  }
+  if (!tile_set.seam_heat.empty()) {
+    container.sections.push_back(MakeSection<uint8_t>(
+        "seam_heat", {tiles, tile_set.tile_size, tile_set.tile_size}, tile_set.seam_heat));
+  }
   TESSERA_RETURN_IF_ERROR(AddSharedTables(tile_set.btfels, container));
   TESSERA_RETURN_IF_ERROR(AddCoefficientsByEnergy(tile_set.btfels, container));
   return SerializeContainer(std::move(container));
@@ -121,6 +141,16 @@ absl::StatusOr<TileSet> ParseTileSet(std::span<const std::byte> bytes) {
   }
   tile_set.tile_size = static_cast<int>(index->shape[1]);
   tile_set.tile_index = SectionValues<uint32_t>(*index);
+  if (container.Find("source_pixels") != nullptr) {
+    TESSERA_ASSIGN_OR_RETURN(const Section* sources, RequireSection(container, "source_pixels", DType::kU32,
+                                                                    std::array<int64_t, 1>{-1}));
+    tile_set.source_pixels = SectionValues<uint32_t>(*sources);
+  }
+  if (container.Find("seam_heat") != nullptr) {
+    const std::array<int64_t, 3> shape = {codes->shape[0], tile_set.tile_size, tile_set.tile_size};
+    TESSERA_ASSIGN_OR_RETURN(const Section* heat, RequireSection(container, "seam_heat", DType::kU8, shape));
+    tile_set.seam_heat = SectionValues<uint8_t>(*heat);
+  }
   TESSERA_ASSIGN_OR_RETURN(tile_set.btfels, ReadSharedTables(container));
   TESSERA_RETURN_IF_ERROR(ReadCoefficientsByEnergy(container, tile_set.btfels));
   TESSERA_ASSIGN_OR_RETURN(tile_set.provenance, ReadProvenance(container));

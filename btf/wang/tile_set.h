@@ -35,6 +35,11 @@ struct TileSet {
   std::vector<uint32_t> tile_codes;  // ascending, the arrangement's
   std::vector<uint32_t> tile_index;  // [tiles][w][w], row 0 on top; see PackTexel
   BtfelTable btfels;                 // only the referenced BTFels
+  // Where each BTFel lies in the exemplar, [BTFels], y * width + x, ascending; empty where unknown.
+  std::vector<uint32_t> source_pixels;
+  // How visible the seams at each texel are, [tiles][w][w]: 0 no seam, 64 as the material's own steps
+  // (tiles/certificate.h); empty where unknown.
+  std::vector<uint8_t> seam_heat;
   Provenance provenance;
   std::string radiometry;
   nlohmann::json certificate = nlohmann::json::object();  // measured seam quality

@@ -1,4 +1,4 @@
-// What a tile set's certificate gives reason to warn of.
+// A tile set's certificate in words, and what it gives reason to warn of.
 #pragma once
 
 #include <string>
@@ -11,6 +11,10 @@ namespace tessera::cli {
 // Seams whose ratio is above this are worth a look: along a cut, texels then differ half as much again as
 // neighbours in the material itself do (ratio 1: the cut cannot be told from the material).
 inline constexpr double kSeamRatioLimit = 1.5;
+
+// A table of seams beside what random cuts score, and lines on repetition and use of the material. Figures
+// that are missing are left out.
+[[nodiscard]] std::string CertificateText(const Json& certificate);
 
 // One sentence per part of the certificate (borders, insides) whose pooled ratio is above the limit.
 [[nodiscard]] std::vector<std::string> CertificateWarnings(const Json& certificate);

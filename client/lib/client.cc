@@ -171,6 +171,13 @@ absl::StatusOr<v1::Job> Client::SynthesizeTileSet(v1::SynthesizeTileSetRequest r
       request.request_id());
 }
 
+absl::StatusOr<v1::Job> Client::CertifyTileSet(v1::CertifyTileSetRequest request, const RunContext& context) {
+  FillRequestId(request);
+  return Asked(
+      CallUnary(*stubs_->tile_sets, &v1::TileSets::Stub::CertifyTileSet, request, options_.retry, context),
+      request.request_id());
+}
+
 absl::StatusOr<v1::TileSet> Client::CreateTileSet(v1::CreateTileSetRequest request,
                                                   const RunContext& context) {
   FillRequestId(request);

@@ -99,6 +99,8 @@ class Client {
   // Tile sets.
   [[nodiscard]] absl::StatusOr<v1::Job> SynthesizeTileSet(v1::SynthesizeTileSetRequest request,
                                                           const RunContext& context = {});
+  [[nodiscard]] absl::StatusOr<v1::Job> CertifyTileSet(v1::CertifyTileSetRequest request,
+                                                       const RunContext& context = {});
   [[nodiscard]] absl::StatusOr<v1::TileSet> CreateTileSet(v1::CreateTileSetRequest request,
                                                           const RunContext& context = {});
   [[nodiscard]] absl::StatusOr<v1::TileSet> GetTileSet(std::string_view name, const RunContext& context = {});

@@ -1,5 +1,6 @@
 #include "server/jobs/builtin_kinds.h"
 
+#include "server/jobs/certify_job.h"
 #include "server/jobs/generate_job.h"
 #include "server/jobs/import_job.h"
 #include "server/jobs/synthesize_job.h"
@@ -10,7 +11,8 @@ std::vector<JobKind> BuiltinJobKinds() {
   return {
       {"import", 1, &RunImportJob},
       {"generate", 1, &RunGenerateJob},
-      {"synthesize", 1, &RunSynthesizeJob},
+      {"synthesize", 2, &RunSynthesizeJob},
+      {std::string(kCertifyKind), 1, &RunCertifyJob, /*updates_result=*/true},
   };
 }
 

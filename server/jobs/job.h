@@ -20,6 +20,9 @@
 
 namespace tessera {
 
+// Largest container that a job parses in memory.
+inline constexpr uint64_t kMaxJobContainerBytes = uint64_t{4} << 30;
+
 // Where a job reads its inputs. Thread-safe.
 class BlobReader {
  public:
@@ -56,6 +59,9 @@ struct JobKind {
   std::string name;
   int version = 1;  // part of the identity of work: raise it when results change
   JobFunction run;
+  // Its last input is what the name of its result holds: the job fails where the name holds something else by
+  // the time it ends.
+  bool updates_result = false;
 };
 
 }  // namespace tessera

@@ -16,7 +16,6 @@
 namespace tessera {
 namespace {
 
-constexpr uint64_t kMaxMaterialBytes = uint64_t{4} << 30;
 constexpr uint32_t kMaxTileSize = 1024;
 constexpr uint32_t kMinStripHeight = 8;
 
@@ -65,7 +64,7 @@ absl::StatusOr<JobOutput> RunSynthesizeJob(const JobInput& input, const JobConte
   FillDefaults(request);
   TESSERA_ASSIGN_OR_RETURN(const std::string arrangement_id, ParseArrangementName(request.name()));
   TESSERA_ASSIGN_OR_RETURN(const Arrangement* arrangement, FindArrangement(arrangement_id));
-  TESSERA_ASSIGN_OR_RETURN(std::string bytes, context.blobs->ReadAll(input.inputs[0], kMaxMaterialBytes));
+  TESSERA_ASSIGN_OR_RETURN(std::string bytes, context.blobs->ReadAll(input.inputs[0], kMaxJobContainerBytes));
   TESSERA_ASSIGN_OR_RETURN(const Material material, ParseMaterial(std::as_bytes(std::span(bytes))));
   std::string().swap(bytes);
   SynthesisParams params;
@@ -73,8 +72,8 @@ absl::StatusOr<JobOutput> RunSynthesizeJob(const JobInput& input, const JobConte
   params.strip_height = static_cast<int>(request.strip_height());
   params.seed = request.seed();
   params.force = request.force();
-  TESSERA_ASSIGN_OR_RETURN(const TileSet tile_set,
-                           SynthesizeTileSet(material, *arrangement, params, context.run));
+  TESSERA_ASSIGN_OR_RETURN(TileSet tile_set, SynthesizeTileSet(material, *arrangement, params, context.run));
+  tile_set.metadata[kMaterialDigestKey] = input.inputs[0];
   TESSERA_ASSIGN_OR_RETURN(std::string container, SerializeTileSet(tile_set));
   return JobOutput{std::move(container), MessageFromTileSet(tile_set)};
 }

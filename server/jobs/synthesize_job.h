@@ -12,6 +12,9 @@
 
 namespace tessera {
 
+// Key of a tile set's metadata: the digest of the container of the material it was made of.
+inline constexpr char kMaterialDigestKey[] = "material_sha256";
+
 // What can be refused before the job is queued. Errors: INVALID_ARGUMENT naming the field and its legal
 // values.
 [[nodiscard]] absl::Status CheckSynthesizeRequest(const v1::SynthesizeTileSetRequest& request);

@@ -243,9 +243,8 @@ absl::Status WorkerPool::Execute(const JobRecord& record, const std::stop_token&
   if (taken) {
     return absl::OkStatus();
   }
-  const auto kind = std::find_if(kinds_.begin(), kinds_.end(),
-                                 [&](const JobKind& known) { return known.name == record.job.kind(); });
-  if (kind == kinds_.end() || kind->version != record.version) {
+  const JobKind* const kind = FindKind(record);
+  if (kind == nullptr || kind->version != record.version) {
     return absl::UnimplementedError(absl::StrCat("this server does not run jobs of kind \"",
                                                  record.job.kind(), "\", version ", record.version));
   }
@@ -259,6 +258,12 @@ absl::Status WorkerPool::Execute(const JobRecord& record, const std::stop_token&
   TESSERA_RETURN_IF_ERROR(context.run.CheckStop());
   TESSERA_ASSIGN_OR_RETURN(const JobOutput output, kind->run({record.params, record.inputs}, context));
   return Commit(record, output);
+}
+
+const JobKind* WorkerPool::FindKind(const JobRecord& record) const {
+  const auto kind = std::find_if(kinds_.begin(), kinds_.end(),
+                                 [&](const JobKind& known) { return known.name == record.job.kind(); });
+  return kind == kinds_.end() ? nullptr : &*kind;
 }
 
 absl::Status WorkerPool::TakeOverEqualWork(const JobRecord& record, bool& taken) {
@@ -298,6 +303,12 @@ absl::Status WorkerPool::CommitRows(Database& db, const JobRecord& record, const
     v1::TileSet message;
     if (!message.ParseFromString(work.message)) {
       return absl::InternalError("the job described its result as something else than a tile set");
+    }
+    if (const JobKind* const kind = FindKind(record); kind != nullptr && kind->updates_result) {
+      TESSERA_ASSIGN_OR_RETURN(const v1::TileSet now, GetTileSet(db, id));
+      if (now.blob().sha256() != record.inputs.back()) {
+        return absl::FailedPreconditionError(absl::StrCat(name, " was replaced meanwhile"));
+      }
     }
     TESSERA_RETURN_IF_ERROR(
         PutTileSet(db, id, work.blob_sha256, std::move(message), record.on_taken, clock_()).status());

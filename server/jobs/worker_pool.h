@@ -71,6 +71,7 @@ class WorkerPool {
   [[nodiscard]] absl::StatusOr<std::optional<JobRecord>> Claim();
   void Run(const JobRecord& record);
   [[nodiscard]] absl::Status Execute(const JobRecord& record, const std::stop_token& stop);
+  [[nodiscard]] const JobKind* FindKind(const JobRecord& record) const;
   [[nodiscard]] absl::Status TakeOverEqualWork(const JobRecord& record, bool& taken);
   [[nodiscard]] absl::Status Commit(const JobRecord& record, const JobOutput& output);
   [[nodiscard]] absl::Status CommitRows(Database& db, const JobRecord& record, const FinishedWork& work);

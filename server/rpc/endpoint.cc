@@ -98,6 +98,10 @@ class TileSetsAdapter final : public v1::TileSets::Service {
                                  v1::Job* response) override {
     return Answer(service_.SynthesizeTileSet(*request), response);
   }
+  grpc::Status CertifyTileSet(ServerContext*, const v1::CertifyTileSetRequest* request,
+                              v1::Job* response) override {
+    return Answer(service_.CertifyTileSet(*request), response);
+  }
   grpc::Status CreateTileSet(ServerContext*, const v1::CreateTileSetRequest* request,
                              v1::TileSet* response) override {
     return Answer(service_.CreateTileSet(*request), response);

@@ -3,6 +3,7 @@
 #include <span>
 
 #include <absl/strings/str_cat.h>
+#include <nlohmann/json.hpp>
 
 #include "btf/base/status_macros.h"
 #include "btf/wang/arrangement.h"
@@ -10,6 +11,7 @@
 #include "proto/wire/convert.h"
 #include "proto/wire/names.h"
 #include "proto/wire/status.h"
+#include "server/jobs/certify_job.h"
 #include "server/jobs/synthesize_job.h"
 #include "server/rpc/formats.h"
 
@@ -51,6 +53,30 @@ absl::StatusOr<v1::Job> TileSetsService::SynthesizeTileSet(
                    request.replace() ? OnTaken::kReplace : OnTaken::kRefuse});
 }
 
+absl::StatusOr<v1::Job> TileSetsService::CertifyTileSet(const v1::CertifyTileSetRequest& request) const {
+  TESSERA_ASSIGN_OR_RETURN(const v1::TileSet tile_set, GetNamed(request.name()));
+  const nlohmann::json metadata =
+      nlohmann::json::parse(tile_set.metadata_json(), nullptr, /*allow_exceptions=*/false);
+  const auto digest = metadata.is_object() ? metadata.find(kMaterialDigestKey) : metadata.end();
+  if (digest == metadata.end() || !digest->is_string()) {
+    return WithReason(
+        absl::FailedPreconditionError(absl::StrCat(
+            request.name(), " does not record the material it was made of: synthesise it again")),
+        "MATERIAL_UNKNOWN", request.name());
+  }
+  v1::CertifyTileSetRequest params = request;
+  params.clear_name();
+  params.clear_request_id();
+  TESSERA_ASSIGN_OR_RETURN(const int version, backend_.pool.KindVersion(std::string(kCertifyKind)));
+  return QueueJob(backend_, "CertifyTileSet", request.request_id(), request,
+                  {std::string(kCertifyKind),
+                   version,
+                   params.SerializeAsString(),
+                   {digest->get<std::string>(), tile_set.blob().sha256()},
+                   tile_set.name(),
+                   OnTaken::kReplace});
+}
+
 absl::StatusOr<v1::TileSet> TileSetsService::CreateTileSet(const v1::CreateTileSetRequest& request) const {
   TESSERA_ASSIGN_OR_RETURN(const TileSetId id, ParseTileSetName(request.name()));
   TESSERA_RETURN_IF_ERROR(CheckDigest(request.blob_sha256(), "blob_sha256"));
@@ -85,7 +111,11 @@ absl::StatusOr<v1::TileSet> TileSetsService::CreateTileSet(const v1::CreateTileS
 }
 
 absl::StatusOr<v1::TileSet> TileSetsService::GetTileSet(const v1::GetTileSetRequest& request) const {
-  TESSERA_ASSIGN_OR_RETURN(const TileSetId id, ParseTileSetName(request.name()));
+  return GetNamed(request.name());
+}
+
+absl::StatusOr<v1::TileSet> TileSetsService::GetNamed(const std::string& name) const {
+  TESSERA_ASSIGN_OR_RETURN(const TileSetId id, ParseTileSetName(name));
   v1::TileSet response;
   TESSERA_RETURN_IF_ERROR(backend_.connections.Read([&](Database& db) -> absl::Status {
     TESSERA_ASSIGN_OR_RETURN(response, tessera::GetTileSet(db, id));

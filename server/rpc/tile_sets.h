@@ -15,6 +15,7 @@ class TileSetsService {
   explicit TileSetsService(const Backend& backend) : backend_(backend) {}
 
   [[nodiscard]] absl::StatusOr<v1::Job> SynthesizeTileSet(const v1::SynthesizeTileSetRequest& request) const;
+  [[nodiscard]] absl::StatusOr<v1::Job> CertifyTileSet(const v1::CertifyTileSetRequest& request) const;
   [[nodiscard]] absl::StatusOr<v1::TileSet> CreateTileSet(const v1::CreateTileSetRequest& request) const;
   [[nodiscard]] absl::StatusOr<v1::TileSet> GetTileSet(const v1::GetTileSetRequest& request) const;
   [[nodiscard]] absl::StatusOr<v1::ListTileSetsResponse> ListTileSets(
@@ -23,6 +24,8 @@ class TileSetsService {
       const v1::DeleteTileSetRequest& request) const;
 
  private:
+  [[nodiscard]] absl::StatusOr<v1::TileSet> GetNamed(const std::string& name) const;
+
   const Backend& backend_;
 };
 

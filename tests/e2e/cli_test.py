@@ -214,11 +214,19 @@ class MainJobTest(harness.CommandTest):
         self.assertEqual(self.run_json("tileset", "list", "--arrangement", "plane-16")["tile_sets"], [])
         self.assertIn("surface-96/skin", self.run_ok("tileset", "list").out)
         self.assertEqual(self.run_json("tileset", "show", "surface-96/skin")["strip_height"], 8)
-        self.assertIn("certificate", self.run_json("tileset", "certify", "surface-96/skin"))
+        shown = self.run_json("tileset", "show", "surface-96/skin")["certificate"]
+        self.assertLess(shown["images"]["count"], shown["images"]["of"])
+        again = self.run_json("tileset", "certify", "surface-96/skin")["certificate"]
+        self.assertEqual(again, shown)
+        whole = self.run_json("tileset", "certify", "surface-96/skin", "--full")["certificate"]
+        self.assertEqual(whole["images"]["count"], shown["images"]["of"])
+        self.assertEqual(self.run_json("tileset", "show", "surface-96/skin")["certificate"], whole)
         self.assert_fails(5, "tileset", "synthesize", "skin", *SYNTHESIZE, "--force", reason="NAME_TAKEN")
         self.run_ok("tileset", "pull", "surface-96/skin", "-o", "skin-tiles.tsra")
         self.run_ok("tileset", "sheet", "surface-96/skin", "-o", "tiles.png")
         self.assertGreater(self.picture("tiles.png")[2], 20)
+        self.run_ok("tileset", "sheet", "surface-96/skin", "--heat", "-o", "heat.png")
+        self.assertGreater(self.picture("heat.png")[0], 1.8 * self.picture("tiles.png")[0])
         # A strip that is as large as the material cannot be cut from it.
         result = self.tessera("tileset", "synthesize", "skin", "--arrangement", "surface-96", "--tile", 128, "--strip", 64,
                               "--force", "--name", "too-large", "--json")

@@ -37,6 +37,25 @@ TEST(RenderTileSheet, ShowsEveryTexelTurnedAndLeavesGapsClear) {
   }
 }
 
+TEST(RenderTileSheet, ShowsSeamsBesideTheTiles) {
+  TileSet tile_set = RandomTileSet(RandomBtfels(30, 9, 4, 1), 16, 2);
+  EXPECT_EQ(RenderTileSheet(tile_set, {.seam_heat = true}, RunContext{}).status().code(),
+            absl::StatusCode::kInvalidArgument);
+  tile_set.seam_heat.assign(tile_set.tile_index.size(), 0);
+  tile_set.seam_heat[17] = 64;  // tile 0, (1, 1): as the material
+  tile_set.seam_heat[34] = 255;
+  const auto sheet = RenderTileSheet(tile_set, {.columns = 12, .gap = 3, .seam_heat = true}, RunContext{});
+  ASSERT_TRUE(sheet.ok()) << sheet.status();
+  EXPECT_EQ(sheet->width, 2 * 12 * 19 + 3);
+  const float* const tile = sheet->at(12 * 19 + 3, 3);
+  const float* const natural = sheet->at(12 * 19 + 4, 4);
+  const float* const visible = sheet->at(12 * 19 + 5, 5);
+  EXPECT_TRUE(tile[0] == tile[1] && tile[1] == tile[2]);
+  EXPECT_GT(natural[2], 5.0f * natural[0]);
+  EXPECT_GT(visible[0], 5.0f * visible[2]);
+  EXPECT_EQ(visible[3], 1.0f);
+}
+
 TEST(RenderTileSheet, RefusesBadParametersAndTileSets) {
   TileSet tile_set = RandomTileSet(RandomBtfels(30, 1, 1, 1), 16, 2);
   const auto code = [&](const SheetParams& params) {

@@ -13,6 +13,7 @@
 #include "btf/data/direction_sets.h"
 #include "btf/data/memory_btf.h"
 #include "btf/tiles/anisotropy.h"
+#include "btf/tiles/certificate.h"
 #include "tests/btf/tiles/noise_exemplar.h"
 
 namespace tessera {
@@ -114,15 +115,39 @@ TEST(SynthesizeTileSetTest, EveryTexelIsABtfelOfTheMaterial) {
 
   EXPECT_EQ(set->metadata["seed"], 1);
   EXPECT_EQ(set->metadata["parameters"]["tile_size"], 16);
-  EXPECT_DOUBLE_EQ(set->metadata["referenced_share"].get<double>(), set->btfels.size() / 1440.0);
+  EXPECT_DOUBLE_EQ(set->certificate["referenced_share"].get<double>(), set->btfels.size() / 1440.0);
   EXPECT_GT(set->metadata["captured_variance"]["search_share"].get<double>(), 0.5);
   EXPECT_LE(set->metadata["captured_variance"]["cut_share"].get<double>(), 1.0 + 1e-9);
   EXPECT_LE(set->metadata["anisotropy"]["figure"].get<double>(), kAnisotropyLimit);
   EXPECT_LE(set->metadata["tiles"]["worst_mean_mismatch"].get<double>(), SmallParams().mean_threshold);
-  EXPECT_EQ(set->certificate["images"].size(), 16u);
-  EXPECT_EQ(set->certificate["images"][0]["light_polar_deg"], 15.0);
+  EXPECT_EQ(set->certificate["images"]["of"], material.btfels.views.size() * material.btfels.lights.size());
+  EXPECT_EQ(set->certificate["controls"]["false_cuts"], 1.0);
   EXPECT_GT(set->certificate["insides"]["ratio"].get<double>(), 0.0);
   EXPECT_GT(set->certificate["borders"]["verbatim_share"].get<double>(), 0.0);
+}
+
+TEST(SynthesizeTileSetTest, IsCertifiedAgainByItsOwnMaterialOnly) {
+  const Material material = MakeMaterial(40, 36, Pattern::kBumps);
+  absl::StatusOr<TileSet> set =
+      SynthesizeTileSet(material, **FindArrangement("plane-16"), SmallParams(), RunContext{});
+  ASSERT_TRUE(set.ok()) << set.status();
+  TileSet again = *set;
+  again.certificate.clear();
+  again.seam_heat.clear();
+  ASSERT_TRUE(CertifyTileSet(material, CertificateImages::kStratified, RunContext{}, again).ok());
+  EXPECT_EQ(again.certificate, set->certificate);
+  EXPECT_EQ(again.seam_heat, set->seam_heat);
+  EXPECT_EQ(again.seam_heat.size(), again.tile_index.size());
+  Material other = material;
+  for (size_t i = 0; i < other.btfels.codes.size(); i += other.btfels.num_coefficients) {
+    other.btfels.codes[i] ^= 1;
+  }
+  const absl::Status refused = CertifyTileSet(other, CertificateImages::kStratified, RunContext{}, again);
+  EXPECT_EQ(refused.code(), absl::StatusCode::kFailedPrecondition);
+  EXPECT_THAT(std::string(refused.message()), testing::HasSubstr("BTFel 0"));
+  again.source_pixels.clear();
+  EXPECT_EQ(CertifyTileSet(material, CertificateImages::kStratified, RunContext{}, again).code(),
+            absl::StatusCode::kFailedPrecondition);
 }
 
 TEST(SynthesizeTileSetTest, WritesTheSameBytesForAnyNumberOfThreads) {

@@ -47,6 +47,11 @@ inline TileSet SmallTileSet(std::string_view arrangement_id, uint64_t seed = 1) 
   table.lights = {{0.0, 0.0}, {0.5, 1.0}, {1.2, 3.0}};
   tile_set.provenance = {"made by the test", "CC0", "nobody"};
   tile_set.radiometry = "reflectance";
+  for (int i = 0; i < kNumBtfels; ++i) {
+    tile_set.source_pixels.push_back(static_cast<uint32_t>(3 * i + 1));
+  }
+  tile_set.seam_heat.assign(tile_set.tile_index.size(), 0);
+  tile_set.seam_heat[5] = 70;
   tile_set.certificate = {{"ratio", 1.05}};
   tile_set.metadata = {{"seed", 7}};
   tile_set.other_keys = {{"future_key", {1, 2}}};

@@ -61,6 +61,8 @@ TEST(TileSetTest, RoundTripKeepsEverything) {
     EXPECT_EQ(after->strip_height, before.strip_height);
     EXPECT_EQ(after->tile_codes, before.tile_codes);
     EXPECT_EQ(after->tile_index, before.tile_index);
+    EXPECT_EQ(after->source_pixels, before.source_pixels);
+    EXPECT_EQ(after->seam_heat, before.seam_heat);
     EXPECT_EQ(after->btfels.codes, before.btfels.codes);
     EXPECT_EQ(after->btfels.offset, before.btfels.offset);
     EXPECT_EQ(after->btfels.step, before.btfels.step);
@@ -98,6 +100,17 @@ TEST(TileSetTest, HostileValuesAreRefusedByName) {
   };
   EXPECT_THAT(message([](Container& c) { Poke<uint32_t>(c, "tile_index", 65, PackTexel(50, 3)); }),
               HasSubstr("section 'tile_index': tile 1, texel (1, 0) names BTFel 50; there are 50"));
+  EXPECT_THAT(message([](Container& c) { Poke<uint32_t>(c, "source_pixels", 7, 19); }),
+              HasSubstr("section 'source_pixels': 50 pixels for 50 BTFels, or not strictly ascending"));
+  EXPECT_THAT(message([](Container& c) {
+                SectionOf(c, "source_pixels").shape = {25};
+                SectionOf(c, "source_pixels").bytes.resize(100);
+              }),
+              HasSubstr("section 'source_pixels': 25 pixels for 50 BTFels"));
+  EXPECT_THAT(message([](Container& c) {
+                SectionOf(c, "seam_heat").shape = {16, 4, 16};
+              }),
+              HasSubstr("seam_heat"));
   EXPECT_THAT(message([](Container& c) { Poke<uint32_t>(c, "tile_codes", 3, 1000); }),
               HasSubstr("tile_codes"));
   EXPECT_THAT(message([](Container& c) { Poke<uint32_t>(c, "tile_codes", 15, 255); }),

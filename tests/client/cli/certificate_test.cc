@@ -13,6 +13,19 @@ TEST(CertificateTest, WarnsOfEveryPartAboveTheLimit) {
   EXPECT_NE(warnings[0].find("insides read 1.51, above the limit of 1.50"), std::string::npos) << warnings[0];
 }
 
+TEST(CertificateTest, PutsSeamsBesideTheControls) {
+  const Json certificate = {{"images", {{"count", 256}, {"of", 6561}}},
+                            {"borders", {{"ratio", 1.25}, {"cut_share", 0.5}}},
+                            {"controls", {{"random_minimum_cuts", 2.5}}},
+                            {"repetition", {{"ratio", 0.75}, {"plane_peak", 0.3}, {"exemplar_peak", 0.4}}}};
+  const std::string text = CertificateText(certificate);
+  for (const char* const part :
+       {"1.250", "50.0", "2.500", "in 256 of 6561 images", "0.75 times the material's"}) {
+    EXPECT_NE(text.find(part), std::string::npos) << part << " is not in\n" << text;
+  }
+  EXPECT_FALSE(CertificateText(Json::object()).empty());
+}
+
 TEST(CertificateTest, SaysNothingOfACertificateWithoutFigures) {
   EXPECT_TRUE(CertificateWarnings(Json::object()).empty());
   EXPECT_TRUE(CertificateWarnings(Json("none")).empty());

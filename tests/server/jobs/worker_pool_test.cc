@@ -75,7 +75,12 @@ class WorkerPoolTest : public testing::Test {
                                   EXPECT_TRUE(DeleteJobs().ok());
                                 }
                                 return RunTestJob(input, context);
-                              }}},
+                              }},
+                             {"update", 1,
+                              [](const JobInput& input, const JobContext&) -> absl::StatusOr<JobOutput> {
+                                return JobOutput{"blob of " + input.params, v1::TileSet()};
+                              },
+                              /*updates_result=*/true}},
         [this] { return catalog_.now_ms; },
         std::make_shared<spdlog::logger>("test", std::make_shared<spdlog::sinks::null_sink_mt>()));
     ASSERT_TRUE(pool_->Start(num_workers).ok());
@@ -287,6 +292,35 @@ TEST_F(WorkerPoolTest, EqualWorkIsDoneOnce) {
   EXPECT_EQ(WaitForEnd(second).state(), v1::Job::SUCCEEDED);
   EXPECT_EQ(num_runs_, 1);
   EXPECT_EQ(Material("a")->blob().sha256(), Material("b")->blob().sha256());
+}
+
+TEST_F(WorkerPoolTest, AnUpdateOfWhatWasReplacedMeanwhileFails) {
+  StartPool(1);
+  const TileSetId id{"plane-16", "wool"};
+  const auto first = catalog_.blobs->Put("first");
+  ASSERT_TRUE(catalog_
+                  .Write<v1::TileSet>(
+                      [&](Database& db) { return PutTileSet(db, id, *first, {}, OnTaken::kRefuse, 1); })
+                  .ok());
+  const auto update = [&](const std::string& params) {
+    const auto record = catalog_.Write<JobRecord>([&](Database& db) {
+      return InsertJob(db, {"update", 1, params, {*first}, TileSetName(id), OnTaken::kReplace, ""},
+                       catalog_.now_ms);
+    });
+    EXPECT_TRUE(record.ok()) << record.status();
+    pool_->Wake();
+    return WaitForEnd(record->id);
+  };
+  const auto held = [&] {
+    return *catalog_.blobs->ReadAll(
+        catalog_.Write<v1::TileSet>([&](Database& db) { return GetTileSet(db, id); })->blob().sha256(), 100);
+  };
+  EXPECT_EQ(update("once").state(), v1::Job::SUCCEEDED);
+  EXPECT_EQ(held(), "blob of once");
+  const v1::Job late = update("twice");
+  EXPECT_EQ(late.state(), v1::Job::FAILED);
+  EXPECT_EQ(late.error().message(), "arrangements/plane-16/tileSets/wool was replaced meanwhile");
+  EXPECT_EQ(held(), "blob of once");
 }
 
 TEST_F(WorkerPoolTest, ANameTakenMeanwhileFailsTheJob) {
