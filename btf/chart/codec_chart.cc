@@ -18,6 +18,7 @@
 #include "btf/chart/jpeg_peer.h"
 #include "btf/chart/pictures.h"
 #include "btf/codec/decoder.h"
+#include "btf/data/memory_btf.h"
 #include "btf/data/subset_btf.h"
 
 namespace tessera {
@@ -345,18 +346,35 @@ std::vector<int> Middle(int count, int most) {
   return indices;
 }
 
+// The middle texels, in memory where they fit: they are read once an encoding and measurement.
+absl::StatusOr<std::unique_ptr<BtfSource>> MiddleOf(BtfSource& source, const RunContext& context) {
+  constexpr size_t kMostBytes = size_t{1} << 30;
+  const BtfInfo& whole = source.info();
+  TESSERA_ASSIGN_OR_RETURN(std::unique_ptr<SubsetBtf> middle,
+                           SubsetBtf::Create(source, {.columns = Middle(whole.width, kQuickSide),
+                                                      .rows = Middle(whole.height, kQuickSide)}));
+  const int height = middle->info().height;
+  if (middle->SamplesPerRow() * height > kMostBytes / sizeof(float)) {
+    return middle;
+  }
+  RunContext quiet = context;
+  quiet.progress = nullptr;
+  std::vector<float> samples(middle->SamplesPerRow() * height);
+  TESSERA_RETURN_IF_ERROR(middle->ReadRows(0, height, samples, quiet));
+  return MemoryBtf::Create(middle->info(), std::move(samples));
+}
+
 }  // namespace
 
 absl::StatusOr<SourceChart> ChartCodecs(const std::string& name, BtfSource& source, ChartSize size,
                                         OffscreenContext& gl, const RunContext& context) {
   const bool is_quick = size == ChartSize::kQuick;
-  std::unique_ptr<SubsetBtf> middle;
+  std::unique_ptr<BtfSource> middle;
   BtfSource* charted = &source;
   const BtfInfo& whole = source.info();
   SourceChart chart{.name = name};
   if (is_quick && (whole.width > kQuickSide || whole.height > kQuickSide)) {
-    TESSERA_ASSIGN_OR_RETURN(middle, SubsetBtf::Create(source, {.columns = Middle(whole.width, kQuickSide),
-                                                                .rows = Middle(whole.height, kQuickSide)}));
+    TESSERA_ASSIGN_OR_RETURN(middle, MiddleOf(source, context));
     charted = middle.get();
     chart.part = absl::StrCat("the middle ", charted->info().width, "x", charted->info().height, " of ",
                               whole.width, "x", whole.height, " texels");

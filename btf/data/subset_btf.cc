@@ -94,6 +94,10 @@ void SubsetBtf::Gather(std::span<const float> source_row, std::span<float> row) 
           source_row.data() + (static_cast<size_t>(x) * 3 + channel) * num_views * num_lights;
       for (const int view : subset_.views) {
         const float* of_view = pairs + static_cast<size_t>(view) * num_lights;
+        if (subset_.lights.size() == num_lights) {
+          out = std::copy_n(of_view, num_lights, out);
+          continue;
+        }
         for (const int light : subset_.lights) {
           *out++ = of_view[light];
         }
