@@ -12,8 +12,12 @@
 namespace tessera {
 namespace {
 
-// A column that shrinks by this when its parts in the space so far are taken out is rounding of those parts.
-constexpr double kDependence = 1e-10;
+// A column that shrinks by this when its parts in the space so far are taken out is rounding of those parts:
+// products are floats.
+constexpr double kDependence = 1e-6;
+// Parts are taken out again until the column keeps this share of its length: twice where the space is
+// orthonormal (Kahan; Parlett 1998, 6.9), more often where it is not quite, having been rounded.
+constexpr double kSettled = 0.5;
 
 }  // namespace
 
@@ -36,12 +40,14 @@ void BlockLanczos::Extend(Eigen::MatrixXd candidates) {
   for (Eigen::Index i = 0; i < candidates.cols() && added < room; ++i) {
     auto column = candidates.col(i);
     const double before = column.norm();
-    // Twice is enough (Kahan; Parlett 1998, 6.9).
-    for (int round = 0; round < 2; ++round) {
+    double after = before;
+    for (bool settled = false; !settled && after > kDependence * before;) {
+      const double last = after;
       const auto space = basis_.leftCols(known + added);
       column -= space * (space.transpose() * column).eval();
+      after = column.norm();
+      settled = after > kSettled * last;
     }
-    const double after = column.norm();
     if (after > kDependence * before && std::isfinite(after)) {
       basis_.col(known + added++) = column / after;
     }

@@ -76,6 +76,41 @@ TEST(BlockLanczosTest, BeyondTheRankNothingIsLeft) {
   }
 }
 
+// Rows of three kinds, multiplied one after the other as an encoder sees them: what a pass adds beyond the
+// kinds is rounding.
+TEST(BlockLanczosTest, RoundingBeyondTheRankStaysOrthogonal) {
+  constexpr int kSize = 360;
+  constexpr int kBlock = 60;
+  for (uint64_t seed = 1; seed <= 6; ++seed) {
+    Rng rng(seed);
+    Eigen::MatrixXf kinds(3, kSize);
+    for (Eigen::Index i = 0; i < kinds.size(); ++i) {
+      kinds.data()[i] = static_cast<float>(1.0 + rng.NextDouble() * static_cast<double>(i % 3));
+    }
+    Eigen::MatrixXf a(45, kSize);
+    for (int row = 0; row < a.rows(); ++row) {
+      a.row(row) = kinds.row(row * 7 % 3);
+    }
+    BlockLanczos lanczos(kSize, kBlock, 1);
+    for (int pass = 0; pass < 3 && !lanczos.is_complete(); ++pass) {
+      const Eigen::MatrixXf t = a * lanczos.block();
+      Eigen::MatrixXf product = Eigen::MatrixXf::Zero(kSize, t.cols());
+      for (int row = 0; row < a.rows(); ++row) {
+        product.noalias() += a.row(row).transpose() * t.row(row);
+      }
+      lanczos.Add(product);
+    }
+    const SingularSpace leading = lanczos.Leading(kBlock);
+    const Eigen::Index rank = leading.values.size();
+    const Eigen::MatrixXd gram = leading.vectors.transpose() * leading.vectors;
+    EXPECT_LT((gram - Eigen::MatrixXd::Identity(rank, rank)).cwiseAbs().maxCoeff(), 1e-5) << seed;
+    const Eigen::VectorXd expected = Eigen::JacobiSVD<Eigen::MatrixXd>(a.cast<double>()).singularValues();
+    for (int i = 0; i < 3; ++i) {
+      EXPECT_NEAR(leading.values[i], expected[i], 1e-5 * expected[0]) << seed << " " << i;
+    }
+  }
+}
+
 TEST(BlockLanczosTest, TakesTheSmallestSpacesAndZero) {
   const SingularSpace one = Iterated(Eigen::MatrixXd::Constant(7, 1, 2.0), 5, 3).Leading(4);
   ASSERT_EQ(one.values.size(), 1);
