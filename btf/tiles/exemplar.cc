@@ -14,8 +14,9 @@ int RoundUp(int n, int multiple) {
 
 }  // namespace
 
-Exemplar::Exemplar(const Embedding& embedding)
-    : width_(embedding.width),
+Exemplar::Exemplar(const Embedding& embedding, SeamRule seam_rule)
+    : seam_rule_(seam_rule),
+      width_(embedding.width),
       height_(embedding.height),
       dims_(RoundUp(std::min(embedding.dims, kCutDims), kLane)),
       search_dims_(std::min(embedding.dims, kSearchDims)) {

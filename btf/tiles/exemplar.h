@@ -26,6 +26,12 @@ inline constexpr uint32_t kNoTexel = 0xffffffffu;
 inline constexpr int kSearchDims = 16;
 inline constexpr int kCutDims = 32;
 
+// What a seam costs, from the mismatch of its patches and their own steps there (seam_graph.h).
+enum class SeamRule {
+  kMismatch,  // [Leung2007], [Kwatra2003]: the mismatch
+  kExcess     // what the mismatch adds to the step: hidden where the material itself changes
+};
+
 // `texel` seen after `turns` more quarter turns.
 constexpr uint32_t TurnTexel(uint32_t texel, int turns) {
   return texel == kNoTexel ? kNoTexel : PackTexel(BtfelOfTexel(texel), TurnsOfTexel(texel) + turns);
@@ -34,8 +40,9 @@ constexpr uint32_t TurnTexel(uint32_t texel, int turns) {
 class Exemplar {
  public:
   // Takes the first kCutDims dimensions; an embedding may have fewer.
-  explicit Exemplar(const Embedding& embedding);
+  explicit Exemplar(const Embedding& embedding, SeamRule seam_rule = SeamRule::kExcess);
 
+  [[nodiscard]] SeamRule seam_rule() const { return seam_rule_; }
   [[nodiscard]] int width() const { return width_; }
   [[nodiscard]] int height() const { return height_; }
   [[nodiscard]] int num_pixels() const { return width_ * height_; }
@@ -75,6 +82,7 @@ class Exemplar {
   [[nodiscard]] double search_spread() const { return search_spread_; }
 
  private:
+  SeamRule seam_rule_;
   int width_ = 0;
   int height_ = 0;
   int dims_ = 0;

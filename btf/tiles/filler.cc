@@ -30,7 +30,7 @@ struct Matching {
   bool must_improve = false;
 };
 constexpr Matching kFirst = {
-    .trials = 4, .repetition = 1.0, .temperature = 0.3, .separation = 4, .must_improve = false};
+    .trials = 8, .repetition = 1.0, .temperature = 0.3, .separation = 4, .must_improve = false};
 constexpr Matching kImprove = {
     .trials = 3, .repetition = 0.1, .temperature = 0.1, .separation = 1, .must_improve = true};
 

@@ -6,13 +6,17 @@
 namespace tessera {
 namespace {
 
-int CostOfDistance(const Exemplar& exemplar, float distance) {
-  const double cost = std::lround(distance * (kCostPerStep / exemplar.mean_step()));
-  return static_cast<int>(std::min<double>(cost, kMaxPairCost / 2));
+// From the mismatches of a seam's two texels, summed, and the own steps of its two patches, summed.
+int SeamCost(const Exemplar& exemplar, float mismatch, float step) {
+  const float visible = exemplar.seam_rule() == SeamRule::kMismatch
+                            ? mismatch
+                            : std::sqrt(step * step + mismatch * mismatch) - step;
+  const double cost = std::lround(visible * (kCostPerStep / exemplar.mean_step()));
+  return static_cast<int>(std::min<double>(cost, kMaxPairCost));
 }
 
-int DistanceCost(const Exemplar& exemplar, uint32_t a, uint32_t b) {
-  return a == b ? 0 : CostOfDistance(exemplar, exemplar.Distance(a, b));
+float Mismatch(const Exemplar& exemplar, uint32_t a, uint32_t b) {
+  return a == b ? 0.0f : exemplar.Distance(a, b);
 }
 
 }  // namespace
@@ -23,16 +27,18 @@ int PairCost(const Exemplar& exemplar, uint32_t a, uint32_t b, int direction) {
     return 0;
   }
   const uint32_t b_at_a = exemplar.Step(b, direction ^ 2);
+  const auto cost = [&](float mismatch, float step) { return SeamCost(exemplar, mismatch, step); };
   if (a_at_b == kNoTexel && b_at_a == kNoTexel) {
-    return 2 * DistanceCost(exemplar, a, b);
+    return cost(2.0f * Mismatch(exemplar, a, b), 0.0f);
   }
   if (a_at_b == kNoTexel) {
-    return 2 * DistanceCost(exemplar, a, b_at_a);
+    return cost(2.0f * Mismatch(exemplar, a, b_at_a), 2.0f * exemplar.Distance(b_at_a, b));
   }
   if (b_at_a == kNoTexel) {
-    return 2 * DistanceCost(exemplar, a_at_b, b);
+    return cost(2.0f * Mismatch(exemplar, a_at_b, b), 2.0f * exemplar.Distance(a, a_at_b));
   }
-  return DistanceCost(exemplar, a, b_at_a) + DistanceCost(exemplar, a_at_b, b);
+  return cost(Mismatch(exemplar, a, b_at_a) + Mismatch(exemplar, a_at_b, b),
+              exemplar.Distance(a, a_at_b) + exemplar.Distance(b_at_a, b));
 }
 
 Canvas::Canvas(const Exemplar& exemplar, int width, int height)
@@ -111,7 +117,7 @@ const PatchCut& PatchCutter::Cut(const Canvas& canvas, const Window& window, con
   cut_ = PatchCut{};
   cut_.takes_new.assign(static_cast<size_t>(width) * height, 0);
   new_texels_.resize(cut_.takes_new.size());
-  distance_.assign(cut_.takes_new.size(), 0);
+  distance_.assign(cut_.takes_new.size(), 0.0f);
   grid_.Reset(width, height);
   for (int y = 0; y < height; ++y) {
     for (int x = 0; x < width; ++x) {
@@ -121,7 +127,7 @@ const PatchCut& PatchCutter::Cut(const Canvas& canvas, const Window& window, con
       if (old_texel == kNoTexel) {
         grid_.AddTerminals(x, y, 0, GridCut::kPinned);
       } else {
-        distance_[index] = DistanceCost(exemplar, old_texel, new_texels_[index]);
+        distance_[index] = Mismatch(exemplar, old_texel, new_texels_[index]);
         if (canvas.fixed(window.x + x, window.y + y)) {
           grid_.AddTerminals(x, y, GridCut::kPinned, 0);
         }
@@ -141,11 +147,13 @@ const PatchCut& PatchCutter::Cut(const Canvas& canvas, const Window& window, con
   // seam lies between.
   const auto mixed = [&](uint32_t old_here, uint32_t old_there, int direction, size_t here, size_t there) {
     const uint32_t continued = exemplar.Step(old_here, direction);
+    const float new_step = exemplar.Distance(new_texels_[here], new_texels_[there]);
     if (continued == kNoTexel) {
-      return 2 * distance_[here];
+      return SeamCost(exemplar, 2.0f * distance_[here], 2.0f * new_step);
     }
-    return distance_[here] + (continued == old_there ? distance_[there]
-                                                     : DistanceCost(exemplar, continued, new_texels_[there]));
+    const float beyond =
+        continued == old_there ? distance_[there] : Mismatch(exemplar, continued, new_texels_[there]);
+    return SeamCost(exemplar, distance_[here] + beyond, exemplar.Distance(old_here, continued) + new_step);
   };
   const auto add_pair = [&](int x, int y, int direction, int other_x, int other_y, int old_cost) {
     const size_t here = static_cast<size_t>(y) * width + x;

@@ -2,13 +2,17 @@
 //
 // The picture holds, for every texel, which exemplar texel it is. Two neighbours p, q with sources a, b are a
 // seam where b does not continue a. With a' the exemplar texel that continues a at q, and b' the one that
-// continues b at p, the seam costs |a - b'| + |a' - b| in the embedding: the mismatch of the two patches at p
-// and at q. So old seams need no memory of the patches that made them.
+// continues b at p, m = |a - b'| + |a' - b| in the embedding is the mismatch of the two patches at p and at
+// q, and n = |a - a'| + |b' - b| are their own steps. Under SeamRule::kMismatch the seam costs m. Under
+// kExcess it costs sqrt(n^2 + m^2) - n: a mismatch in no particular direction makes of a step n one of
+// sqrt(n^2 + m^2), and what shows is how much larger that is. So cuts follow the edges that the material has
+// of its own. Old seams need no memory of the patches that made them.
 //
 // Laying a patch chooses old or new for each texel of its window. Each pair is a 2 x 2 table of costs:
 // old/old what the pair costs now, new/new 0, and the two mixed seams; reduced to unary terms and one
-// directed edge [Kolmogorov2004], the grid keeps its four neighbours. Where both continuations exist the
-// table is submodular by the triangle inequality; elsewhere a negative edge is truncated to 0 and counted.
+// directed edge [Kolmogorov2004], the grid keeps its four neighbours. Where both continuations exist and the
+// mismatch is the cost, the table is submodular by the triangle inequality; elsewhere a negative edge is
+// truncated to 0, which makes one mixed choice dearer than it is, and counted.
 #pragma once
 
 #include <cstdint>
@@ -24,10 +28,10 @@ inline constexpr int kCostPerStep = 128;
 inline constexpr int kMaxPairCost = GridCut::kMaxCapacitySum / 2;
 
 // Cost of the neighbours a and b, b lying in `direction` from a; 0 when b continues a. Symmetric. Where one
-// continuation falls off the exemplar the other counts twice; where both do, |a - b| does.
+// continuation falls off the exemplar the other counts twice; where both do, |a - b| does, beside no step.
 int PairCost(const Exemplar& exemplar, uint32_t a, uint32_t b, int direction);
 
-// Half of what a pair costs, in mean steps: the average mismatch of its two texels.
+// Half of what a pair costs, in mean steps: under kMismatch the average mismatch of its two texels.
 constexpr double MismatchOfCost(double cost) {
   return cost / (2.0 * kCostPerStep);
 }
@@ -94,9 +98,11 @@ struct Patch {
 // What laying a patch would do.
 struct PatchCut {
   std::vector<uint8_t> takes_new;  // [window height][window width]
-  int64_t cost_change = 0;         // of the canvas, pairs of newly filled texels included
-  int num_new = 0;                 // texels whose source changes
-  int num_truncated = 0;           // pairs whose table was not submodular
+  // Of the canvas, pairs of newly filled texels included; at least the true change where tables were
+  // truncated.
+  int64_t cost_change = 0;
+  int num_new = 0;        // texels whose source changes
+  int num_truncated = 0;  // pairs whose table was not submodular
 };
 
 // Cuts patches into a canvas. Keeps scratch memory: one per thread.
@@ -112,7 +118,7 @@ class PatchCutter {
   GridCut grid_;
   PatchCut cut_;
   std::vector<uint32_t> new_texels_;
-  std::vector<int> distance_;  // |old - new| by texel of the window, in cost units
+  std::vector<float> distance_;  // |old - new| by texel of the window
 };
 
 }  // namespace tessera

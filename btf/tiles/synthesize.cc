@@ -113,7 +113,7 @@ absl::StatusOr<TileSet> SynthesizeTileSet(const Material& material, const Arrang
     return absl::InvalidArgumentError(absl::StrCat("unknown codec '", material.btfels.codec_id, "'"));
   }
   TESSERA_ASSIGN_OR_RETURN(const Embedding embedding, codec->Embed(material, kCutDims, context));
-  const Exemplar exemplar(embedding);
+  const Exemplar exemplar(embedding, params.seam_rule);
   const Anisotropy anisotropy = MeasureAnisotropy(exemplar, context);
   TESSERA_RETURN_IF_ERROR(context.CheckStop());
   if (arrangement.turned_strips && anisotropy.figure() > kAnisotropyLimit && !params.force) {
@@ -156,6 +156,7 @@ absl::StatusOr<TileSet> SynthesizeTileSet(const Material& material, const Arrang
                                 {"strip_height", params.strip_height},
                                 {"mean_threshold", params.mean_threshold},
                                 {"texel_threshold", params.texel_threshold},
+                                {"seam_rule", params.seam_rule == SeamRule::kExcess ? "excess" : "mismatch"},
                                 {"force", params.force}};
   set.metadata["exemplar"] = {{"width", material.width}, {"height", material.height}};
   set.metadata["captured_variance"] = {{"search_dims", exemplar.search_dims()},

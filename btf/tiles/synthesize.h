@@ -12,6 +12,7 @@
 
 #include "btf/base/run_context.h"
 #include "btf/codec/material.h"
+#include "btf/tiles/exemplar.h"
 #include "btf/wang/arrangement.h"
 #include "btf/wang/tile_set.h"
 
@@ -24,11 +25,12 @@ struct SynthesisParams {
   // Synthesise turned strips of an anisotropic material all the same, and keep strips and tiles that miss a
   // threshold: metadata.thresholds_reached tells.
   bool force = false;
+  SeamRule seam_rule = SeamRule::kExcess;
   // A filled strip or tile must reach both. In units of the material's mean embedding distance of
   // neighbouring texels:
-  double mean_threshold = 3.0;  // mean mismatch along cuts
+  double mean_threshold = 3.0;  // mean cost along cuts, a mismatch or its excess
   // In units of the root mean square distance of two texels drawn at random:
-  double texel_threshold = 2.0;  // largest mismatch of one cut pair
+  double texel_threshold = 2.0;  // largest cost of one cut pair
 };
 
 // Every texel of the result is a BTFel of `material` with a turn (0 throughout for "plane-*"); the table

@@ -1,6 +1,7 @@
 #include "btf/tiles/seam_graph.h"
 
 #include <algorithm>
+#include <cmath>
 #include <cstdint>
 #include <limits>
 #include <vector>
@@ -29,8 +30,11 @@ int64_t CostOf(const Canvas& canvas) {
   return cost;
 }
 
-TEST(PairCostTest, IsZeroWithinAPatchAndSymmetricAcrossASeam) {
-  const Exemplar exemplar(BumpyEmbedding(12, 9, 4));
+class SeamRuleTest : public testing::TestWithParam<SeamRule> {};
+INSTANTIATE_TEST_SUITE_P(Both, SeamRuleTest, testing::Values(SeamRule::kMismatch, SeamRule::kExcess));
+
+TEST_P(SeamRuleTest, ACostIsZeroWithinAPatchAndSymmetricAcrossASeam) {
+  const Exemplar exemplar(BumpyEmbedding(12, 9, 4), GetParam());
   Rng rng(1);
   for (int round = 0; round < 2000; ++round) {
     const uint32_t a =
@@ -46,8 +50,26 @@ TEST(PairCostTest, IsZeroWithinAPatchAndSymmetricAcrossASeam) {
 }
 
 // A canvas full of old seams, some texels fixed, some empty; every choice of old and new tried.
-TEST(PatchCutterTest, FindsTheCheapestChoiceWithOldSeams) {
-  const Exemplar exemplar(BumpyEmbedding(24, 20, 5));
+TEST(PairCostTest, ExcessIsTheMismatchWhereTheMaterialIsFlatAndLittleAtItsEdges) {
+  // Columns 0 0 0 9 9 9 0.. beside each other, then the same shifted by one grey of 1.
+  Embedding embedding{
+      .width = 12, .height = 1, .dims = 1, .values = {}, .variance = {1.0}, .total_variance = 1.0};
+  for (int turn = 0; turn < 4; ++turn) {
+    embedding.values.insert(embedding.values.end(), {0, 0, 0, 9, 9, 9, 1, 1, 1, 10, 10, 10});
+  }
+  const Exemplar mismatch(embedding, SeamRule::kMismatch);
+  const Exemplar excess(embedding, SeamRule::kExcess);
+  // Texels 1 and 8: both patches are flat. 2 and 9: both step by 9, and the mismatch is 1.
+  EXPECT_EQ(PairCost(mismatch, 1, 8, GridCut::kRight), PairCost(mismatch, 2, 9, GridCut::kRight));
+  EXPECT_EQ(PairCost(excess, 1, 8, GridCut::kRight), PairCost(mismatch, 1, 8, GridCut::kRight));
+  EXPECT_NEAR(PairCost(excess, 2, 9, GridCut::kRight),
+              PairCost(mismatch, 2, 9, GridCut::kRight) * (std::sqrt(82.0) - 9.0), 1.0);
+}
+
+// Under kExcess, tables of old seams that are not submodular are rare, but occur.
+TEST_P(SeamRuleTest, ACutFindsTheCheapestChoiceWithOldSeams) {
+  const Exemplar exemplar(BumpyEmbedding(24, 20, 5), GetParam());
+  int num_exact = 0;
   Rng rng(2);
   PatchCutter cutter;
   for (int round = 0; round < 150; ++round) {
@@ -85,11 +107,17 @@ TEST(PatchCutterTest, FindsTheCheapestChoiceWithOldSeams) {
       }
     }
     const PatchCut cut = cutter.Cut(canvas, window, patch);
-    EXPECT_EQ(cut.cost_change, best - CostOf(canvas)) << "round " << round;
-    EXPECT_EQ(cut.num_truncated, 0);
     Canvas after = canvas;
     PatchCutter::Apply(window, patch, cut, after);
-    EXPECT_EQ(CostOf(after), best) << "round " << round;
+    if (GetParam() == SeamRule::kMismatch) {
+      EXPECT_EQ(cut.num_truncated, 0) << "round " << round;
+    }
+    if (cut.num_truncated == 0) {
+      ++num_exact;
+      EXPECT_EQ(cut.cost_change, best - CostOf(canvas)) << "round " << round;
+      EXPECT_EQ(CostOf(after), best) << "round " << round;
+    }
+    EXPECT_GE(cut.cost_change, CostOf(after) - CostOf(canvas)) << "round " << round;
     for (int y = 0; y < 5; ++y) {
       for (int x = 0; x < 6; ++x) {
         if (canvas.fixed(x, y)) {
@@ -98,6 +126,7 @@ TEST(PatchCutterTest, FindsTheCheapestChoiceWithOldSeams) {
       }
     }
   }
+  EXPECT_GT(num_exact, 100);
 }
 
 TEST(CanvasTest, KeepsPairCostsWhenTexelsChange) {
