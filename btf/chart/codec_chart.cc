@@ -347,7 +347,7 @@ std::vector<int> Middle(int count, int most) {
 }
 
 // The middle texels, in memory where they fit: they are read once an encoding and measurement.
-absl::StatusOr<std::unique_ptr<BtfSource>> MiddleOf(BtfSource& source, const RunContext& context) {
+absl::StatusOr<std::unique_ptr<BtfSource>> MiddleTexels(BtfSource& source, const RunContext& context) {
   constexpr size_t kMostBytes = size_t{1} << 30;
   const BtfInfo& whole = source.info();
   TESSERA_ASSIGN_OR_RETURN(std::unique_ptr<SubsetBtf> middle,
@@ -374,7 +374,7 @@ absl::StatusOr<SourceChart> ChartCodecs(const std::string& name, BtfSource& sour
   const BtfInfo& whole = source.info();
   SourceChart chart{.name = name};
   if (is_quick && (whole.width > kQuickSide || whole.height > kQuickSide)) {
-    TESSERA_ASSIGN_OR_RETURN(middle, MiddleOf(source, context));
+    TESSERA_ASSIGN_OR_RETURN(middle, MiddleTexels(source, context));
     charted = middle.get();
     chart.part = absl::StrCat("the middle ", charted->info().width, "x", charted->info().height, " of ",
                               whole.width, "x", whole.height, " texels");

@@ -15,9 +15,9 @@ absl::StatusOr<JobOutput> RunCertifyJob(const JobInput& input, const JobContext&
   if (!request.ParseFromString(input.params) || input.inputs.size() != 2) {
     return absl::InternalError("a certify job takes a CertifyTileSetRequest and two blobs");
   }
-  TESSERA_ASSIGN_OR_RETURN(std::string bytes, context.blobs->ReadAll(input.inputs[0], kMaxJobContainerBytes));
+  TESSERA_ASSIGN_OR_RETURN(std::string bytes, context.blobs->ReadAll(input.inputs[0], kMaxContainerBytes));
   TESSERA_ASSIGN_OR_RETURN(const Material material, ParseMaterial(std::as_bytes(std::span(bytes))));
-  TESSERA_ASSIGN_OR_RETURN(bytes, context.blobs->ReadAll(input.inputs[1], kMaxJobContainerBytes));
+  TESSERA_ASSIGN_OR_RETURN(bytes, context.blobs->ReadAll(input.inputs[1], kMaxContainerBytes));
   TESSERA_ASSIGN_OR_RETURN(TileSet tile_set, ParseTileSet(std::as_bytes(std::span(bytes))));
   std::string().swap(bytes);
   const CertificateImages which =

@@ -20,8 +20,8 @@
 
 namespace tessera {
 
-// Largest container that a job parses in memory.
-inline constexpr uint64_t kMaxJobContainerBytes = uint64_t{4} << 30;
+// Largest container that is parsed in memory.
+inline constexpr uint64_t kMaxContainerBytes = uint64_t{4} << 30;
 
 // Where a job reads its inputs. Thread-safe.
 class BlobReader {

@@ -64,7 +64,7 @@ absl::StatusOr<JobOutput> RunSynthesizeJob(const JobInput& input, const JobConte
   FillDefaults(request);
   TESSERA_ASSIGN_OR_RETURN(const std::string arrangement_id, ParseArrangementName(request.name()));
   TESSERA_ASSIGN_OR_RETURN(const Arrangement* arrangement, FindArrangement(arrangement_id));
-  TESSERA_ASSIGN_OR_RETURN(std::string bytes, context.blobs->ReadAll(input.inputs[0], kMaxJobContainerBytes));
+  TESSERA_ASSIGN_OR_RETURN(std::string bytes, context.blobs->ReadAll(input.inputs[0], kMaxContainerBytes));
   TESSERA_ASSIGN_OR_RETURN(const Material material, ParseMaterial(std::as_bytes(std::span(bytes))));
   std::string().swap(bytes);
   SynthesisParams params;

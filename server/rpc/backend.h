@@ -15,14 +15,13 @@
 #include "server/catalog/connections.h"
 #include "server/catalog/job_table.h"
 #include "server/catalog/resources.h"
+#include "server/jobs/job.h"
 #include "server/jobs/job_events.h"
 #include "server/jobs/worker_pool.h"
 #include "tessera/v1/tessera.pb.h"
 
 namespace tessera {
 
-// Largest container that is parsed in memory.
-inline constexpr uint64_t kMaxContainerBytes = uint64_t{4} << 30;
 // Largest piece of a blob in one message.
 inline constexpr size_t kChunkBytes = 1 << 20;
 

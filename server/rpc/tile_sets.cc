@@ -54,6 +54,12 @@ absl::StatusOr<v1::Job> TileSetsService::SynthesizeTileSet(
 }
 
 absl::StatusOr<v1::Job> TileSetsService::CertifyTileSet(const v1::CertifyTileSetRequest& request) const {
+  v1::Job earlier;
+  TESSERA_ASSIGN_OR_RETURN(const bool answered, FindEarlierAnswer(backend_, "CertifyTileSet",
+                                                                  request.request_id(), request, earlier));
+  if (answered) {
+    return earlier;  // the tile set may be gone by now
+  }
   TESSERA_ASSIGN_OR_RETURN(const v1::TileSet tile_set, GetNamed(request.name()));
   const nlohmann::json metadata =
       nlohmann::json::parse(tile_set.metadata_json(), nullptr, /*allow_exceptions=*/false);

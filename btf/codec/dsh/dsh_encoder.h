@@ -9,9 +9,6 @@
 // Rows of texels are streamed, groups of texels fitted at once (dsh_fitter.h). Source of the first:
 // [Leung2007] 3.1, 5 and appendix; the last is ours.
 // One ridge serves a pass, not one for each signal: the directions decide how much of a signal can be told.
-// One for each signal, chosen the same way, changed the error on held-out lights by -2% to +0.2% with 9
-// functions and by -0.7% to +5% with 25 and 49 (wool, reactdiffuse, weave): it follows the noise of the
-// choice.
 #pragma once
 
 #include <absl/status/statusor.h>
