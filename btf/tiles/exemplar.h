@@ -29,7 +29,7 @@ inline constexpr int kCutDims = 32;
 // What a seam costs, from the mismatch of its patches and their own steps there (seam_graph.h).
 enum class SeamRule {
   kMismatch,  // [Leung2007], [Kwatra2003]: the mismatch
-  kExcess     // what the mismatch adds to the step: hidden where the material itself changes
+  kExcess     // what the seam's step exceeds those by: hidden where the material itself changes
 };
 
 // `texel` seen after `turns` more quarter turns.

@@ -6,11 +6,18 @@
 namespace tessera {
 namespace {
 
-// From the mismatches of a seam's two texels, summed, and the own steps of its two patches, summed.
-int SeamCost(const Exemplar& exemplar, float mismatch, float step) {
-  const float visible = exemplar.seam_rule() == SeamRule::kMismatch
-                            ? mismatch
-                            : std::sqrt(step * step + mismatch * mismatch) - step;
+// Under SeamRule::kExcess, what a broken continuation costs beside a step that shows at once. At 0 cuts end
+// features wherever the texels on both sides happen to be alike; at 1 they avoid that at any price.
+constexpr float kContinuity = 0.3f;
+
+// Of the seam between a and b, from the mismatches of its two texels, summed, and the own steps of its two
+// patches, summed.
+int SeamCost(const Exemplar& exemplar, uint32_t a, uint32_t b, float mismatch, float step) {
+  float visible = mismatch;
+  if (exemplar.seam_rule() == SeamRule::kExcess) {
+    const float expected_excess = std::sqrt(step * step + mismatch * mismatch) - step;
+    visible = std::max(0.0f, 2.0f * exemplar.Distance(a, b) - step) + kContinuity * expected_excess;
+  }
   const double cost = std::lround(visible * (kCostPerStep / exemplar.mean_step()));
   return static_cast<int>(std::min<double>(cost, kMaxPairCost));
 }
@@ -27,7 +34,7 @@ int PairCost(const Exemplar& exemplar, uint32_t a, uint32_t b, int direction) {
     return 0;
   }
   const uint32_t b_at_a = exemplar.Step(b, direction ^ 2);
-  const auto cost = [&](float mismatch, float step) { return SeamCost(exemplar, mismatch, step); };
+  const auto cost = [&](float mismatch, float step) { return SeamCost(exemplar, a, b, mismatch, step); };
   if (a_at_b == kNoTexel && b_at_a == kNoTexel) {
     return cost(2.0f * Mismatch(exemplar, a, b), 0.0f);
   }
@@ -147,13 +154,14 @@ const PatchCut& PatchCutter::Cut(const Canvas& canvas, const Window& window, con
   // seam lies between.
   const auto mixed = [&](uint32_t old_here, uint32_t old_there, int direction, size_t here, size_t there) {
     const uint32_t continued = exemplar.Step(old_here, direction);
-    const float new_step = exemplar.Distance(new_texels_[here], new_texels_[there]);
+    const uint32_t new_there = new_texels_[there];
+    const float new_step = exemplar.Distance(new_texels_[here], new_there);
     if (continued == kNoTexel) {
-      return SeamCost(exemplar, 2.0f * distance_[here], 2.0f * new_step);
+      return SeamCost(exemplar, old_here, new_there, 2.0f * distance_[here], 2.0f * new_step);
     }
-    const float beyond =
-        continued == old_there ? distance_[there] : Mismatch(exemplar, continued, new_texels_[there]);
-    return SeamCost(exemplar, distance_[here] + beyond, exemplar.Distance(old_here, continued) + new_step);
+    const float beyond = continued == old_there ? distance_[there] : Mismatch(exemplar, continued, new_there);
+    return SeamCost(exemplar, old_here, new_there, distance_[here] + beyond,
+                    exemplar.Distance(old_here, continued) + new_step);
   };
   const auto add_pair = [&](int x, int y, int direction, int other_x, int other_y, int old_cost) {
     const size_t here = static_cast<size_t>(y) * width + x;

@@ -4,9 +4,11 @@
 // seam where b does not continue a. With a' the exemplar texel that continues a at q, and b' the one that
 // continues b at p, m = |a - b'| + |a' - b| in the embedding is the mismatch of the two patches at p and at
 // q, and n = |a - a'| + |b' - b| are their own steps. Under SeamRule::kMismatch the seam costs m. Under
-// kExcess it costs sqrt(n^2 + m^2) - n: a mismatch in no particular direction makes of a step n one of
-// sqrt(n^2 + m^2), and what shows is how much larger that is. So cuts follow the edges that the material has
-// of its own. Old seams need no memory of the patches that made them.
+// kExcess it costs max(0, 2 |a - b| - n) + kContinuity (sqrt(n^2 + m^2) - n): by how much the step across the
+// seam exceeds the material's own, which is what a certificate measures, and by how much it would if the
+// mismatch had no particular direction, so that no feature ends only because the other side happens to look
+// alike in one place. So cuts follow the edges that the material has of its own. Old seams need no memory of
+// the patches that made them.
 //
 // Laying a patch chooses old or new for each texel of its window. Each pair is a 2 x 2 table of costs:
 // old/old what the pair costs now, new/new 0, and the two mixed seams; reduced to unary terms and one

@@ -49,8 +49,7 @@ TEST_P(SeamRuleTest, ACostIsZeroWithinAPatchAndSymmetricAcrossASeam) {
   }
 }
 
-// A canvas full of old seams, some texels fixed, some empty; every choice of old and new tried.
-TEST(PairCostTest, ExcessIsTheMismatchWhereTheMaterialIsFlatAndLittleAtItsEdges) {
+TEST(PairCostTest, ExcessIsWhatASeamStepsBeyondItsPatchesAndSomeOfWhatTheyWouldHaveShown) {
   // Columns 0 0 0 9 9 9 0.. beside each other, then the same shifted by one grey of 1.
   Embedding embedding{
       .width = 12, .height = 1, .dims = 1, .values = {}, .variance = {1.0}, .total_variance = 1.0};
@@ -59,20 +58,28 @@ TEST(PairCostTest, ExcessIsTheMismatchWhereTheMaterialIsFlatAndLittleAtItsEdges)
   }
   const Exemplar mismatch(embedding, SeamRule::kMismatch);
   const Exemplar excess(embedding, SeamRule::kExcess);
-  // Texels 1 and 8: both patches are flat. 2 and 9: both step by 9, and the mismatch is 1.
-  EXPECT_EQ(PairCost(mismatch, 1, 8, GridCut::kRight), PairCost(mismatch, 2, 9, GridCut::kRight));
-  EXPECT_EQ(PairCost(excess, 1, 8, GridCut::kRight), PairCost(mismatch, 1, 8, GridCut::kRight));
-  EXPECT_NEAR(PairCost(excess, 2, 9, GridCut::kRight),
-              PairCost(mismatch, 2, 9, GridCut::kRight) * (std::sqrt(82.0) - 9.0), 1.0);
+  const double unit = kCostPerStep / excess.mean_step();
+  // Texels 1 and 8: both patches are flat, the step of 1 shows.
+  EXPECT_NEAR(PairCost(mismatch, 1, 8, GridCut::kRight), 2.0 * unit, 1.0);
+  EXPECT_NEAR(PairCost(excess, 1, 8, GridCut::kRight), (2.0 + 0.3 * 2.0) * unit, 1.0);
+  // Texels 2 and 9: both patches step by 9, the seam by 10.
+  EXPECT_NEAR(PairCost(mismatch, 2, 9, GridCut::kRight), 2.0 * unit, 1.0);
+  EXPECT_NEAR(PairCost(excess, 2, 9, GridCut::kRight), (2.0 + 0.3 * (std::sqrt(328.0) - 18.0)) * unit, 1.0);
+  // Texels 5 and 10: their patches step by 8 and 0, the seam by 1 only.
+  EXPECT_NEAR(PairCost(excess, 5, 10, GridCut::kRight),
+              0.3 * (std::sqrt(8.0 * 8.0 + 10.0 * 10.0) - 8.0) * unit, 1.0);
+  // Texels 2 and 1: nothing steps here, but the edge beyond texel 2 is lost.
+  EXPECT_NEAR(PairCost(excess, 2, 1, GridCut::kRight), 0.3 * (std::sqrt(162.0) - 9.0) * unit, 1.0);
 }
 
-// Under kExcess, tables of old seams that are not submodular are rare, but occur.
+// A canvas full of old seams, some texels fixed, some empty; every choice of old and new tried. Under
+// kExcess, tables of old seams that are not submodular occur.
 TEST_P(SeamRuleTest, ACutFindsTheCheapestChoiceWithOldSeams) {
   const Exemplar exemplar(BumpyEmbedding(24, 20, 5), GetParam());
   int num_exact = 0;
   Rng rng(2);
   PatchCutter cutter;
-  for (int round = 0; round < 150; ++round) {
+  for (int round = 0; round < 300; ++round) {
     Canvas canvas(exemplar, 6, 5);
     for (int y = 0; y < 5; ++y) {
       for (int x = 0; x < 6; ++x) {
