@@ -34,14 +34,24 @@ Exemplar::Exemplar(const Embedding& embedding, SeamRule seam_rule)
     }
   }
 
+  for (int turn = 0; turn < 4; ++turn) {
+    for (int direction = 0; direction < 4; ++direction) {
+      for (int pixel = 0; pixel < num_pixels(); ++pixel) {
+        const uint32_t texel = PackTexel(static_cast<uint32_t>(pixel), turn);
+        const uint32_t beside = Step(texel, direction);
+        step_lengths_.push_back(beside == kNoTexel ? 0.0f : Distance(texel, beside));
+      }
+    }
+  }
+
   double sum = 0.0;
   int64_t num_steps = 0;
   for (int y = 0; y < height_; ++y) {
     for (int x = 0; x < width_; ++x) {
       const uint32_t texel = TexelAt(0, x, y);
       for (const int direction : {GridCut::kRight, GridCut::kDown}) {
-        if (const uint32_t neighbour = Step(texel, direction); neighbour != kNoTexel) {
-          sum += Distance(texel, neighbour);
+        if (Step(texel, direction) != kNoTexel) {
+          sum += StepLength(texel, direction);
           ++num_steps;
         }
       }

@@ -71,6 +71,11 @@ class Exemplar {
            (static_cast<size_t>(TurnsOfTexel(texel)) * num_pixels() + BtfelOfTexel(texel)) * dims_;
   }
   [[nodiscard]] float Distance(uint32_t a, uint32_t b) const;
+  // Of a texel and the one beside it in a GridCut::Direction, from a table; 0 off the exemplar.
+  [[nodiscard]] float StepLength(uint32_t texel, int direction) const {
+    return step_lengths_[(static_cast<size_t>(TurnsOfTexel(texel)) * 4 + direction) * num_pixels() +
+                         BtfelOfTexel(texel)];
+  }
 
   // What mismatches are measured in: the mean distance of neighbours, and the root mean square distance of
   // two texels drawn at random.
@@ -91,8 +96,9 @@ class Exemplar {
   double spread_ = 0.0;
   double search_spread_ = 0.0;
   std::vector<double> mean_;
-  std::vector<float> values_;     // [turn][pixel][dims]
-  std::vector<uint32_t> beside_;  // [direction][pixel] of the unturned exemplar, kNoTexel off it
+  std::vector<float> values_;        // [turn][pixel][dims]
+  std::vector<uint32_t> beside_;     // [direction][pixel] of the unturned exemplar, kNoTexel off it
+  std::vector<float> step_lengths_;  // [turn][direction][pixel]
 };
 
 }  // namespace tessera

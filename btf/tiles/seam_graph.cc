@@ -39,13 +39,13 @@ int PairCost(const Exemplar& exemplar, uint32_t a, uint32_t b, int direction) {
     return cost(2.0f * Mismatch(exemplar, a, b), 0.0f);
   }
   if (a_at_b == kNoTexel) {
-    return cost(2.0f * Mismatch(exemplar, a, b_at_a), 2.0f * exemplar.Distance(b_at_a, b));
+    return cost(2.0f * Mismatch(exemplar, a, b_at_a), 2.0f * exemplar.StepLength(b, direction ^ 2));
   }
   if (b_at_a == kNoTexel) {
-    return cost(2.0f * Mismatch(exemplar, a_at_b, b), 2.0f * exemplar.Distance(a, a_at_b));
+    return cost(2.0f * Mismatch(exemplar, a_at_b, b), 2.0f * exemplar.StepLength(a, direction));
   }
   return cost(Mismatch(exemplar, a, b_at_a) + Mismatch(exemplar, a_at_b, b),
-              exemplar.Distance(a, a_at_b) + exemplar.Distance(b_at_a, b));
+              exemplar.StepLength(a, direction) + exemplar.StepLength(b, direction ^ 2));
 }
 
 Canvas::Canvas(const Exemplar& exemplar, int width, int height)
@@ -155,13 +155,13 @@ const PatchCut& PatchCutter::Cut(const Canvas& canvas, const Window& window, con
   const auto mixed = [&](uint32_t old_here, uint32_t old_there, int direction, size_t here, size_t there) {
     const uint32_t continued = exemplar.Step(old_here, direction);
     const uint32_t new_there = new_texels_[there];
-    const float new_step = exemplar.Distance(new_texels_[here], new_there);
+    const float new_step = exemplar.StepLength(new_texels_[here], direction);
     if (continued == kNoTexel) {
       return SeamCost(exemplar, old_here, new_there, 2.0f * distance_[here], 2.0f * new_step);
     }
     const float beyond = continued == old_there ? distance_[there] : Mismatch(exemplar, continued, new_there);
     return SeamCost(exemplar, old_here, new_there, distance_[here] + beyond,
-                    exemplar.Distance(old_here, continued) + new_step);
+                    exemplar.StepLength(old_here, direction) + new_step);
   };
   const auto add_pair = [&](int x, int y, int direction, int other_x, int other_y, int old_cost) {
     const size_t here = static_cast<size_t>(y) * width + x;
