@@ -9,6 +9,7 @@
 #include "btf/base/parallel.h"
 #include "btf/base/rng.h"
 #include "btf/base/status_macros.h"
+#include "btf/tiles/border_cut.h"
 
 namespace tessera {
 namespace {
@@ -56,7 +57,7 @@ uint32_t TexelOf(const Exemplar& exemplar, const std::vector<Patch>& samples, co
 
 // Cuts one pair. The square is laid out as a picture: column i, row h/2 - 1 - j.
 CornerCut CutPair(const Exemplar& exemplar, const std::vector<Patch>& samples, const CornerPair& pair,
-                  int strip_height, GridCut& grid, std::vector<uint32_t>& scratch) {
+                  int strip_height, BorderCut& grid, std::vector<uint32_t>& scratch) {
   const int half = strip_height / 2;
   const int area = half * half;
   scratch.resize(static_cast<size_t>(2) * area);
@@ -69,32 +70,30 @@ CornerCut CutPair(const Exemplar& exemplar, const std::vector<Patch>& samples, c
       in[index] = TexelOf(exemplar, samples, InTexel(pair, i, j, strip_height));
     }
   }
-  // Source side shows `out`, sink side `in`.
-  grid.Reset(half, half);
+  // Source side shows `out`, sink side `in`. Beyond the square, a column on the right goes on with `out` and
+  // a row on top with `in`: the way round from vertex to opposite corner is out's on the right and below,
+  // in's on the left and above.
+  grid.Reset(half + 1, half + 1);
+  grid.SetTerminals({{half, 1}, {0, half}}, {{0, half - 1}, {half - 1, 0}});
   for (int y = 0; y < half; ++y) {
     for (int x = 0; x < half; ++x) {
       const int p = y * half + x;
       const auto set_edge = [&](GridCut::Direction direction, int q) {
-        grid.SetEdge(x, y, direction, PairCost(exemplar, out[p], in[q], direction),
+        grid.SetEdge(x, y + 1, direction, PairCost(exemplar, out[p], in[q], direction),
                      PairCost(exemplar, in[p], out[q], direction));
       };
       if (x + 1 < half) {
         set_edge(GridCut::kRight, p + 1);
       } else if (const uint32_t beyond = exemplar.Step(out[p], GridCut::kRight); beyond != kNoTexel) {
-        grid.AddTerminals(x, y, PairCost(exemplar, in[p], beyond, GridCut::kRight), 0);
+        grid.SetEdge(x, y + 1, GridCut::kRight, 0, PairCost(exemplar, in[p], beyond, GridCut::kRight));
       }
       if (y + 1 < half) {
         set_edge(GridCut::kDown, p + half);
       }
       if (y == 0) {
         if (const uint32_t beyond = exemplar.Step(in[p], GridCut::kUp); beyond != kNoTexel) {
-          grid.AddTerminals(x, y, 0, PairCost(exemplar, out[p], beyond, GridCut::kUp));
+          grid.SetEdge(x, y + 1, GridCut::kUp, PairCost(exemplar, out[p], beyond, GridCut::kUp), 0);
         }
-      }
-      if (y == half - 1) {
-        grid.AddTerminals(x, y, GridCut::kPinned, 0);
-      } else if (x == 0) {
-        grid.AddTerminals(x, y, 0, GridCut::kPinned);
       }
     }
   }
@@ -105,7 +104,7 @@ CornerCut CutPair(const Exemplar& exemplar, const std::vector<Patch>& samples, c
   cut.cost += PairCost(exemplar, out[(half - 1) * half], across, GridCut::kLeft);
   for (int j = 0; j < half; ++j) {
     for (int i = 0; i < half; ++i) {
-      cut.in_wins[static_cast<size_t>(j) * half + i] = grid.OnSourceSide(i, half - 1 - j) ? 0 : 1;
+      cut.in_wins[static_cast<size_t>(j) * half + i] = grid.OnSourceSide(i, half - j) ? 0 : 1;
     }
   }
   return cut;
@@ -348,7 +347,7 @@ class CornerSearch {
   std::vector<Patch> samples_;
   Statistics typical_;
   SearchQuery query_;
-  GridCut grid_;
+  BorderCut grid_;
   std::vector<uint32_t> scratch_;
 };
 

@@ -5,7 +5,7 @@
 #include <cstdint>
 
 #include "btf/base/rng.h"
-#include "btf/tiles/max_flow.h"
+#include "btf/tiles/border_cut.h"
 #include "btf/tiles/seam_graph.h"
 
 namespace tessera {
@@ -47,7 +47,7 @@ RandomJoins JoinAtRandom(const Exemplar& exemplar, const std::vector<int>& turns
   const int height = std::min(kJoinHeights * strip_height, shorter);
   Rng rng(kJoinSeed);
   RandomJoins joins;
-  GridCut grid;
+  BorderCut grid;
   for (int join = 0; join < kJoins; ++join) {
     const auto draw = [&] {
       const int turn = turns[rng.NextBelow(turns.size())];
@@ -63,9 +63,8 @@ RandomJoins JoinAtRandom(const Exemplar& exemplar, const std::vector<int>& turns
     };
     // Source side shows the left patch.
     grid.Reset(width, height);
+    grid.SetTerminals({{0, height - 1}, {0, 0}}, {{width - 1, 0}, {width - 1, height - 1}});
     for (int y = 0; y < height; ++y) {
-      grid.AddTerminals(0, y, GridCut::kPinned, 0);
-      grid.AddTerminals(width - 1, y, 0, GridCut::kPinned);
       for (int x = 0; x < width; ++x) {
         const auto set_edge = [&](GridCut::Direction direction, int other_x, int other_y) {
           grid.SetEdge(x, y, direction,
