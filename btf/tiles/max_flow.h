@@ -6,11 +6,11 @@
 //   int64_t value = cut.Solve();
 //   bool source_side = cut.OnSourceSide(x, y);
 //
-// Integers throughout, so that a cut is exact and the same on every machine. Incremental breadth-first search
-// [Goldberg2011]: two shortest-path trees grow level by level from the terminals; a path that joins them is
-// augmented; nodes cut off by it are adopted at the lowest level that has a residual arc to them, or set
-// free. A node takes 16 bytes. Differs from [Goldberg2011] in that children are found by looking at the four
-// neighbours, not by lists.
+// Integers throughout, so that a cut is exact and the same on every machine. Push-relabel [Goldberg1988]:
+// excess is pushed along arcs that descend towards the sink, first come, first served, and a node that has
+// excess but no such arc is raised; all heights are measured anew once in a while, and what stands above an
+// empty height has no way down [Cherkassky1997]. Only the cut is found: excess that cannot reach the sink
+// stays where it is. A node takes 16 bytes.
 //
 // One GridCut per thread; Reset keeps the memory.
 #pragma once
@@ -51,78 +51,50 @@ class GridCut {
     Node& node = nodes_[Index(x, y)];
     const int added = from_source - to_sink;
     // What can run straight from source to sink through this node does.
-    flow_ += std::min(from_source, to_sink) + std::max(0, std::min(node.terminal, -added)) +
-             std::max(0, std::min(-node.terminal, added));
-    node.terminal += added;
+    flow_ += std::min(from_source, to_sink) + std::max(0, std::min(node.excess, -added)) +
+             std::max(0, std::min(-node.excess, added));
+    node.excess += added;
   }
 
   // The value of the minimum cut. Call once after setting up.
   int64_t Solve();
 
-  // After Solve: the side of a minimum cut that (x, y) lies on.
-  [[nodiscard]] bool OnSourceSide(int x, int y) const {
-    const uint32_t tree = nodes_[Index(x, y)].label & kTreeMask;
-    return sink_tree_closed_ ? tree != kSinkTree : tree == kSourceTree;
-  }
+  // After Solve: the side of the minimum cut that (x, y) lies on, of several the one whose sink side is
+  // least.
+  [[nodiscard]] bool OnSourceSide(int x, int y) const { return nodes_[Index(x, y)].height == kNoWay; }
 
   [[nodiscard]] int width() const { return width_; }
   [[nodiscard]] int height() const { return height_; }
 
  private:
-  // label = distance << 5 | parent << 2 | tree. Distance counts arcs from the terminal, which has 0.
+  static constexpr uint32_t kNoWay = UINT32_MAX >> 1;  // leads to the sink
+
   struct Node {
     uint16_t residual[4] = {0, 0, 0, 0};  // of the arcs that leave, by Direction
-    int32_t terminal = 0;                 // > 0: residual from the source; < 0: to the sink
-    uint32_t label = 0;
+    int32_t excess = 0;                   // < 0: what can still go from here to the sink
+    uint32_t height = kNoWay;             // at most the number of arcs to a node that leads to the sink
   };
   static_assert(sizeof(Node) == 16);
 
-  static constexpr uint32_t kTreeMask = 3, kFree = 0, kSourceTree = 1, kSinkTree = 2;
-  static constexpr int kParentShift = 2, kDistanceShift = 5;
-  static constexpr uint32_t kParentMask = 7, kParentTerminal = 4, kParentNone = 5;
-
-  static uint32_t MakeLabel(uint32_t distance, uint32_t parent, uint32_t tree) {
-    return distance << kDistanceShift | parent << kParentShift | tree;
-  }
-  static uint32_t Tree(const Node& node) { return node.label & kTreeMask; }
-  static uint32_t Parent(const Node& node) { return node.label >> kParentShift & kParentMask; }
-  static uint32_t Distance(const Node& node) { return node.label >> kDistanceShift; }
-
   [[nodiscard]] size_t Index(int x, int y) const { return static_cast<size_t>(y + 1) * stride_ + x + 1; }
 
-  template <uint32_t kTree>
-  [[nodiscard]] uint32_t ArcFromParent(uint32_t node, int direction) const;
-  template <uint32_t kTree>
-  void GrowLevel();
-  void Augment(uint32_t source_node, int direction);
-  template <uint32_t kTree>
-  void Push(uint32_t node, int amount);
-  template <uint32_t kTree>
-  [[nodiscard]] int Bottleneck(uint32_t node, int amount) const;
-  template <uint32_t kTree>
-  void MakeOrphan(uint32_t node);
-  template <uint32_t kTree>
-  void Adopt();
+  bool MeasureHeights();
+  void Discharge(uint32_t index);
+  void CutOffAbove(uint32_t height);
 
   int width_ = 0;
   int height_ = 0;
   int stride_ = 0;
   int offset_[4] = {0, 0, 0, 0};
   int64_t flow_ = 0;
-  bool sink_tree_closed_ = false;
   std::vector<Node> nodes_;  // with a border of empty nodes
-  // Of the source tree and the sink tree: nodes of the outermost complete level, those of the level being
-  // made, its number, and whether the level beyond is being made.
-  struct Side {
-    std::vector<uint32_t> frontier;
-    std::vector<uint32_t> next;
-    uint32_t level = 1;
-    bool growing = false;
-    std::vector<std::vector<uint32_t>> orphans;  // by distance
-    uint32_t lowest_orphan = UINT32_MAX;
-    uint32_t highest_orphan = 0;
-  };
-  Side sides_[3];  // by tree; [0] is not used
+  // Nodes with excess that may have a way to the sink: of this pass, and of the next, in the order they got
+  // it.
+  std::vector<uint32_t> active_;
+  std::vector<uint32_t> next_active_;
+  std::vector<int> num_at_height_;   // of all nodes that have a height
+  std::vector<uint32_t> by_height_;  // nodes, while heights are measured
+  int64_t num_raised_ = 0;           // since heights were measured
 };
 
 }  // namespace tessera

@@ -42,10 +42,20 @@ struct Grid {
     return value;
   }
 
-  [[nodiscard]] int64_t BruteForce() const {
-    int64_t best = INT64_MAX;
+  // The value of the minimum cuts and their source sides together, which are one of them.
+  struct Oracle {
+    int64_t value = INT64_MAX;
+    uint32_t source = 0;
+  };
+  [[nodiscard]] Oracle BruteForce() const {
+    Oracle best;
     for (uint32_t source = 0; source < (1u << (width * height)); ++source) {
-      best = std::min(best, CutValue(source));
+      const int64_t value = CutValue(source);
+      if (value < best.value) {
+        best = {value, source};
+      } else if (value == best.value) {
+        best.source |= source;
+      }
     }
     return best;
   }
@@ -101,8 +111,10 @@ TEST(GridCutTest, MatchesBruteForceOnThousandsOfSmallGrids) {
     const Grid grid = RandomGrid(rng, width, height, max_capacity);
     grid.Fill(cut);
     const int64_t value = cut.Solve();
-    ASSERT_EQ(value, grid.BruteForce()) << "round " << round << ", " << width << "x" << height;
-    ASSERT_EQ(value, grid.CutValue(SourceSide(cut))) << "round " << round << ": labels are not the cut";
+    const Grid::Oracle oracle = grid.BruteForce();
+    ASSERT_EQ(value, oracle.value) << "round " << round << ", " << width << "x" << height;
+    ASSERT_EQ(value, grid.CutValue(SourceSide(cut))) << "round " << round << ": sides are not the cut";
+    ASSERT_EQ(SourceSide(cut), oracle.source) << "round " << round << ": not the least sink side";
   }
 }
 
