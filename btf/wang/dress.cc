@@ -87,8 +87,8 @@ std::string BreaksMessage(const QuadMesh& mesh, const Arrangement& arrangement,
   for (size_t i = 0; i < std::min(breaks.size(), kBreaksInMessage); ++i) {
     const Quad& quad = mesh.quads[breaks[i].face];
     absl::StrAppend(&message, i == 0 ? "" : "; ",
-                    EdgeName(mesh, quad[breaks[i].side], quad[(breaks[i].side + 1) & 3]), " (faces ",
-                    breaks[i].face + 1, " and ", breaks[i].other_face + 1, ")");
+                    EdgeName(mesh.positions, quad[breaks[i].side], quad[(breaks[i].side + 1) & 3]),
+                    " (faces ", breaks[i].face + 1, " and ", breaks[i].other_face + 1, ")");
   }
   return absl::StrCat(message, breaks.size() > kBreaksInMessage ? "; .." : "",
                       ". Allow breaks, or take a surface arrangement");

@@ -6,6 +6,7 @@
 
 #include <absl/strings/ascii.h>
 #include <absl/strings/str_cat.h>
+#include <absl/strings/str_format.h>
 #include <Eigen/Geometry>
 
 #include "btf/base/atomic_file.h"
@@ -16,11 +17,6 @@
 
 namespace tessera {
 namespace {
-
-std::string LowerExtension(std::string_view file_name) {
-  const size_t dot = file_name.rfind('.');
-  return dot == std::string_view::npos ? "" : absl::AsciiStrToLower(std::string(file_name.substr(dot)));
-}
 
 absl::Status CheckCornerNormals(const RawMesh& raw) {
   for (size_t face = 0; face < raw.corner_normals.size(); ++face) {
@@ -91,16 +87,15 @@ absl::StatusOr<QuadMesh> Parse(std::span<const std::byte> bytes, std::string_vie
         absl::StrCat("the file has ", bytes.size(), " bytes; the limit is ", kMaxMeshFileBytes));
   }
   const std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
-  const std::string extension = LowerExtension(file_name);
-  if (extension == ".obj") {
-    TESSERA_ASSIGN_OR_RETURN(RawMesh raw, ParseObj(text));
-    return Finish(std::move(raw), notes);
+  const std::string extension = MeshExtension(file_name);
+  if (extension != ".obj" && extension != ".off") {
+    return absl::InvalidArgumentError("the extension is neither .obj nor .off");
   }
-  if (extension == ".off") {
-    TESSERA_ASSIGN_OR_RETURN(RawMesh raw, ParseOff(text));
-    return Finish(std::move(raw), notes);
-  }
-  return absl::InvalidArgumentError("the extension is neither .obj nor .off");
+  TESSERA_ASSIGN_OR_RETURN(
+      RawMesh raw, extension == ".obj" ? ParseObj(text, FaceKind::kQuads) : ParseOff(text, FaceKind::kQuads));
+  notes.faces_not_quads = raw.tally.others();
+  TESSERA_RETURN_IF_ERROR(raw.tally.Check());
+  return Finish(std::move(raw), notes);
 }
 
 absl::Status Named(const absl::Status& status, std::string_view name) {
@@ -119,6 +114,29 @@ absl::StatusOr<QuadMesh> ParseQuadMesh(std::span<const std::byte> bytes, std::st
 }
 
 absl::StatusOr<QuadMesh> ReadQuadMesh(const std::filesystem::path& path, MeshReadNotes* notes) {
+  TESSERA_ASSIGN_OR_RETURN(const std::string text, ReadMeshFile(path));
+  return ParseQuadMesh(std::as_bytes(std::span(text)), path.filename().string(), notes);
+}
+
+std::string WriteObj(const QuadMesh& mesh) {
+  std::string text;
+  for (const Eigen::Vector3f& p : mesh.positions) {
+    absl::StrAppendFormat(&text, "v %.9g %.9g %.9g\n", p.x(), p.y(), p.z());
+  }
+  for (const Eigen::Vector3f& n : mesh.normals) {
+    absl::StrAppendFormat(&text, "vn %.9g %.9g %.9g\n", n.x(), n.y(), n.z());
+  }
+  for (const Quad& quad : mesh.quads) {
+    absl::StrAppend(&text, "f");
+    for (const uint32_t vertex : quad) {
+      absl::StrAppend(&text, " ", uint64_t{vertex} + 1, "//", uint64_t{vertex} + 1);
+    }
+    absl::StrAppend(&text, "\n");
+  }
+  return text;
+}
+
+absl::StatusOr<std::string> ReadMeshFile(const std::filesystem::path& path) {
   std::error_code error;
   const std::filesystem::file_status status = std::filesystem::status(path, error);
   if (!std::filesystem::exists(status)) {
@@ -135,8 +153,12 @@ absl::StatusOr<QuadMesh> ReadQuadMesh(const std::filesystem::path& path, MeshRea
     return absl::ResourceExhaustedError(
         absl::StrCat(path.string(), ": the file has ", size, " bytes; the limit is ", kMaxMeshFileBytes));
   }
-  TESSERA_ASSIGN_OR_RETURN(const std::string text, ReadWholeFile(path));
-  return ParseQuadMesh(std::as_bytes(std::span(text)), path.filename().string(), notes);
+  return ReadWholeFile(path);
+}
+
+std::string MeshExtension(std::string_view file_name) {
+  const size_t dot = file_name.rfind('.');
+  return dot == std::string_view::npos ? "" : absl::AsciiStrToLower(std::string(file_name.substr(dot)));
 }
 
 }  // namespace tessera

@@ -1,4 +1,4 @@
-// Reads quad meshes from Wavefront OBJ and Geomview OFF.
+// Reads quad meshes from Wavefront OBJ and Geomview OFF, and writes OBJ.
 //
 //   TESSERA_ASSIGN_OR_RETURN(QuadMesh mesh, ReadQuadMesh("horse_quad.obj"));
 //
@@ -13,6 +13,7 @@
 #include <cstddef>
 #include <filesystem>
 #include <span>
+#include <string>
 #include <string_view>
 
 #include <absl/status/statusor.h>
@@ -29,6 +30,7 @@ struct MeshReadNotes {
   size_t faces_turned = 0;      // wound against the majority of their component
   size_t vertices_split = 0;    // where faces met in a point only
   size_t vertices_dropped = 0;  // referenced by no face
+  size_t faces_not_quads = 0;   // when above 0, this is why the mesh was refused
 };
 
 // The mesh in `bytes`; the format is told by the extension of `file_name`, which also opens every message.
@@ -46,5 +48,15 @@ struct MeshReadNotes {
 // ParseQuadMesh of a file. Errors: also NOT_FOUND, PERMISSION_DENIED and INTERNAL naming the path.
 [[nodiscard]] absl::StatusOr<QuadMesh> ReadQuadMesh(const std::filesystem::path& path,
                                                     MeshReadNotes* notes = nullptr);
+
+// The mesh as text of an OBJ file: positions, normals, quads; numbers read back as the same float32.
+[[nodiscard]] std::string WriteObj(const QuadMesh& mesh);
+
+// The bytes of a file of at most kMaxMeshFileBytes. Errors: NOT_FOUND, INVALID_ARGUMENT (not a file),
+// RESOURCE_EXHAUSTED naming size and limit, PERMISSION_DENIED and INTERNAL naming the path.
+[[nodiscard]] absl::StatusOr<std::string> ReadMeshFile(const std::filesystem::path& path);
+
+// The extension of a file name, ".obj" for "Horse.OBJ"; empty without one.
+[[nodiscard]] std::string MeshExtension(std::string_view file_name);
 
 }  // namespace tessera

@@ -99,9 +99,16 @@ absl::StatusOr<int64_t> ParseWhole(const LineReader& reader, std::string_view wo
   return value;
 }
 
+void RawMesh::AddFan(std::span<const uint32_t> corners) {
+  for (size_t corner = 2; corner < corners.size(); ++corner) {
+    triangles.push_back({corners[0], corners[corner - 1], corners[corner]});
+  }
+  faces_fanned += corners.size() > 3;
+}
+
 bool FaceTally::Add(size_t corners, size_t line) {
   ++faces_;
-  if (corners == 4) {
+  if (kind_ == FaceKind::kQuads ? corners == 4 : corners >= 3) {
     return true;
   }
   if (others_++ == 0) {
@@ -119,9 +126,10 @@ absl::Status FaceTally::Check() const {
   const std::string kind = first_corners_ == 3  ? "a triangle"
                            : first_corners_ < 3 ? absl::StrCat("a face of ", first_corners_, " corners")
                                                 : absl::StrCat("an n-gon of ", first_corners_, " corners");
-  return absl::InvalidArgumentError(absl::StrCat("face ", first_face_, " (line ", first_line_, ") is ", kind,
-                                                 "; only quads can be dressed (", others_, " of ", faces_,
-                                                 " faces are something else)"));
+  return absl::InvalidArgumentError(absl::StrCat(
+      "face ", first_face_, " (line ", first_line_, ") is ", kind,
+      kind_ == FaceKind::kQuads ? "; only quads can be dressed (" : "; expected three corners or more (",
+      others_, " of ", faces_, " faces are something else)"));
 }
 
 }  // namespace tessera

@@ -162,7 +162,7 @@ absl::StatusOr<size_t> OrientFaces(QuadMesh& mesh) {
           const auto [a, b] = SideVertices(mesh, 4 * face + side);
           return absl::InvalidArgumentError(absl::StrCat("not orientable: faces ", face + 1, " and ",
                                                          other / 4 + 1, " cannot both be oriented along the ",
-                                                         EdgeName(mesh, a, b)));
+                                                         EdgeName(mesh.positions, a, b)));
         }
       }
     }

@@ -30,9 +30,11 @@ absl::Status CheckRoom(const LineReader& reader, size_t count, size_t limit, std
 
 }  // namespace
 
-absl::StatusOr<RawMesh> ParseObj(std::string_view text) {
+absl::StatusOr<RawMesh> ParseObj(std::string_view text, FaceKind kind) {
   RawMesh mesh;
-  FaceTally tally;
+  mesh.tally = FaceTally(kind);
+  std::vector<uint32_t> vertices;
+  std::vector<int32_t> normals;
   bool any_normal = false;
   LineReader reader(text);
   while (reader.Next()) {
@@ -50,15 +52,18 @@ absl::StatusOr<RawMesh> ParseObj(std::string_view text) {
       TESSERA_RETURN_IF_ERROR(CheckRoom(reader, mesh.normals.size(), kMaxMeshVertices, "normals"));
       TESSERA_ASSIGN_OR_RETURN(const Eigen::Vector3f normal, ParseVector(reader, 1));
       mesh.normals.push_back(normal);
-    } else if (words[0] == "f" && tally.Add(words.size() - 1, reader.line())) {
+    } else if (words[0] == "f" && mesh.tally.Add(words.size() - 1, reader.line())) {
+      const size_t corners = words.size() - 1;
       TESSERA_RETURN_IF_ERROR(CheckRoom(reader, mesh.quads.size(), kMaxMeshQuads, "quads"));
-      Quad quad{};
-      std::array<int32_t, 4> normals{-1, -1, -1, -1};
-      for (size_t corner = 0; corner < 4; ++corner) {
+      TESSERA_RETURN_IF_ERROR(
+          CheckRoom(reader, mesh.triangles.size() + corners - 3, kMaxMeshTriangles, "triangles"));
+      vertices.assign(corners, 0);
+      normals.assign(corners, -1);
+      for (size_t corner = 0; corner < corners; ++corner) {
         // v, v/vt, v//vn or v/vt/vn.
         const std::string_view word = words[corner + 1];
         const size_t slash = word.find('/');
-        TESSERA_ASSIGN_OR_RETURN(quad[corner],
+        TESSERA_ASSIGN_OR_RETURN(vertices[corner],
                                  ElementOf(reader, word.substr(0, slash), mesh.positions.size(), "vertex"));
         const size_t second = slash == std::string_view::npos ? slash : word.find('/', slash + 1);
         if (second != std::string_view::npos) {
@@ -68,11 +73,14 @@ absl::StatusOr<RawMesh> ParseObj(std::string_view text) {
           any_normal = true;
         }
       }
-      mesh.quads.push_back(quad);
-      mesh.corner_normals.push_back(normals);
+      if (kind == FaceKind::kQuads) {
+        mesh.quads.push_back({vertices[0], vertices[1], vertices[2], vertices[3]});
+        mesh.corner_normals.push_back({normals[0], normals[1], normals[2], normals[3]});
+      } else {
+        mesh.AddFan(vertices);
+      }
     }
   }
-  TESSERA_RETURN_IF_ERROR(tally.Check());
   if (!any_normal) {
     mesh.corner_normals.clear();
   }

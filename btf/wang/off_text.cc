@@ -56,10 +56,11 @@ absl::StatusOr<OffHeader> ParseHeader(LineReader& reader) {
 
 }  // namespace
 
-absl::StatusOr<RawMesh> ParseOff(std::string_view text) {
+absl::StatusOr<RawMesh> ParseOff(std::string_view text, FaceKind kind) {
   LineReader reader(text);
   TESSERA_ASSIGN_OR_RETURN(const OffHeader header, ParseHeader(reader));
   RawMesh mesh;
+  mesh.tally = FaceTally(kind);
   // Nothing is reserved by the counts: a short file may claim anything.
   for (size_t v = 0; v < header.num_vertices; ++v) {
     if (!reader.Next()) {
@@ -78,7 +79,7 @@ absl::StatusOr<RawMesh> ParseOff(std::string_view text) {
       mesh.normals.push_back(normal);
     }
   }
-  FaceTally tally;
+  std::vector<uint32_t> vertices;
   for (size_t face = 0; face < header.num_faces; ++face) {
     if (!reader.Next()) {
       return absl::InvalidArgumentError(
@@ -89,21 +90,28 @@ absl::StatusOr<RawMesh> ParseOff(std::string_view text) {
       return LineError(reader, absl::StrCat("face ", face + 1, " claims ", corners, " corners and lists ",
                                             reader.words().size() - 1));
     }
-    if (!tally.Add(static_cast<size_t>(corners), reader.line())) {
+    if (!mesh.tally.Add(static_cast<size_t>(corners), reader.line())) {
       continue;
     }
-    Quad quad{};
-    for (size_t corner = 0; corner < 4; ++corner) {
+    vertices.assign(static_cast<size_t>(corners), 0);
+    for (size_t corner = 0; corner < vertices.size(); ++corner) {
       TESSERA_ASSIGN_OR_RETURN(const int64_t vertex, ParseWhole(reader, reader.words()[corner + 1]));
       if (vertex < 0 || static_cast<uint64_t>(vertex) >= header.num_vertices) {
         return LineError(reader, absl::StrCat("face ", face + 1, " names vertex ", vertex, ", expected 0 to ",
                                               static_cast<int64_t>(header.num_vertices) - 1));
       }
-      quad[corner] = static_cast<uint32_t>(vertex);
+      vertices[corner] = static_cast<uint32_t>(vertex);
     }
-    mesh.quads.push_back(quad);
+    if (kind == FaceKind::kQuads) {
+      mesh.quads.push_back({vertices[0], vertices[1], vertices[2], vertices[3]});
+      continue;
+    }
+    if (mesh.triangles.size() + vertices.size() - 2 > kMaxMeshTriangles) {
+      return absl::ResourceExhaustedError(
+          absl::StrCat("line ", reader.line(), ": more than ", kMaxMeshTriangles, " triangles"));
+    }
+    mesh.AddFan(vertices);
   }
-  TESSERA_RETURN_IF_ERROR(tally.Check());
   if (header.has_normals) {
     mesh.corner_normals.resize(mesh.quads.size());
     for (size_t face = 0; face < mesh.quads.size(); ++face) {

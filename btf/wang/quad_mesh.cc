@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
-#include <span>
 
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_format.h>
@@ -56,7 +55,7 @@ absl::Status CheckFace(const QuadMesh& mesh, size_t face) {
   for (int k = 0; k < 4; ++k) {
     if (mesh.positions[quad[k]] == mesh.positions[quad[(k + 1) & 3]]) {
       return absl::InvalidArgumentError(absl::StrCat("face ", face + 1, ": side ", k + 1, " has no length: ",
-                                                     EdgeName(mesh, quad[k], quad[(k + 1) & 3])));
+                                                     EdgeName(mesh.positions, quad[k], quad[(k + 1) & 3])));
     }
   }
   return absl::OkStatus();
@@ -82,9 +81,9 @@ absl::Status ValidateQuadMesh(const QuadMesh& mesh) {
   return absl::OkStatus();
 }
 
-std::string EdgeName(const QuadMesh& mesh, uint32_t vertex_a, uint32_t vertex_b) {
-  const Eigen::Vector3f& a = mesh.positions[vertex_a];
-  const Eigen::Vector3f& b = mesh.positions[vertex_b];
+std::string EdgeName(std::span<const Eigen::Vector3f> positions, uint32_t vertex_a, uint32_t vertex_b) {
+  const Eigen::Vector3f& a = positions[vertex_a];
+  const Eigen::Vector3f& b = positions[vertex_b];
   return absl::StrFormat("edge between vertices %d at (%g, %g, %g) and %d at (%g, %g, %g)",
                          uint64_t{vertex_a} + 1, a.x(), a.y(), a.z(), uint64_t{vertex_b} + 1, b.x(), b.y(),
                          b.z());
@@ -115,8 +114,8 @@ absl::Status CheckEdgesManifold(const QuadMesh& mesh, std::span<const HalfEdge> 
       absl::StrAppend(&faces, count == 0 ? "" : ", ", half_edges[i + count].side / 4 + 1);
     }
     return absl::InvalidArgumentError(
-        absl::StrCat("not a manifold: the ", EdgeName(mesh, edge.low, edge.high), " is shared by ", count,
-                     " faces (", faces, "); at most 2 may meet at an edge"));
+        absl::StrCat("not a manifold: the ", EdgeName(mesh.positions, edge.low, edge.high), " is shared by ",
+                     count, " faces (", faces, "); at most 2 may meet at an edge"));
   }
   return absl::OkStatus();
 }
@@ -135,9 +134,9 @@ absl::StatusOr<QuadAdjacency> BuildAdjacency(const QuadMesh& mesh) {
     const uint32_t side_a = half_edges[i].side % 4;
     const uint32_t side_b = half_edges[i + 1].side % 4;
     if (mesh.quads[face_a][side_a] == mesh.quads[face_b][side_b]) {
-      return absl::InvalidArgumentError(absl::StrCat("not oriented: faces ", face_a + 1, " and ", face_b + 1,
-                                                     " run in the same direction along the ",
-                                                     EdgeName(mesh, half_edges[i].low, half_edges[i].high)));
+      return absl::InvalidArgumentError(absl::StrCat(
+          "not oriented: faces ", face_a + 1, " and ", face_b + 1, " run in the same direction along the ",
+          EdgeName(mesh.positions, half_edges[i].low, half_edges[i].high)));
     }
     adjacency.across[face_a][side_a] = {static_cast<int>(face_b), static_cast<int>(side_b)};
     adjacency.across[face_b][side_b] = {static_cast<int>(face_a), static_cast<int>(side_a)};

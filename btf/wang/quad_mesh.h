@@ -8,6 +8,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -21,6 +22,8 @@ namespace tessera {
 // Most that a mesh may have: 4 million quads, and as many vertices as these have corners.
 inline constexpr size_t kMaxMeshQuads = size_t{1} << 22;
 inline constexpr size_t kMaxMeshVertices = kMaxMeshQuads * 4;
+// Most that a mesh to be remeshed may have: 4 million.
+inline constexpr size_t kMaxMeshTriangles = size_t{1} << 22;
 
 using Quad = std::array<uint32_t, 4>;
 
@@ -50,7 +53,8 @@ struct QuadAdjacency {
 [[nodiscard]] absl::StatusOr<QuadAdjacency> BuildAdjacency(const QuadMesh& mesh);
 
 // "edge between vertices 3 at (0, 0, 1) and 4 at (0, 1, 1)", for messages.
-[[nodiscard]] std::string EdgeName(const QuadMesh& mesh, uint32_t vertex_a, uint32_t vertex_b);
+[[nodiscard]] std::string EdgeName(std::span<const Eigen::Vector3f> positions, uint32_t vertex_a,
+                                   uint32_t vertex_b);
 
 // Smooth unit normals, one a vertex: the corner normals of its faces, each weighted by sin(angle) over the
 // product of the two side lengths, which is exact on spheres and needs no trigonometry. A vertex without a
