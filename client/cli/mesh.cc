@@ -1,4 +1,4 @@
-// tessera mesh dress | redress | info
+// tessera mesh dress | redress | info | remesh
 #include <chrono>
 #include <filesystem>
 #include <memory>
@@ -7,6 +7,8 @@
 
 #include "btf/base/atomic_file.h"
 #include "btf/base/status_macros.h"
+#include "btf/remesh/remesh.h"
+#include "btf/remesh/triangle_mesh_io.h"
 #include "btf/wang/arrangement.h"
 #include "btf/wang/dress.h"
 #include "btf/wang/mesh_io.h"
@@ -16,6 +18,7 @@
 #include "client/cli/arguments.h"
 #include "client/cli/commands.h"
 #include "client/cli/describe.h"
+#include "client/cli/exit_codes.h"
 #include "client/lib/names.h"
 
 namespace tessera::cli {
@@ -31,17 +34,101 @@ std::span<const std::byte> BytesOf(const std::string& text) {
   return std::as_bytes(std::span(text));
 }
 
-absl::StatusOr<QuadMesh> ReadMesh(Session& session, const std::string& mesh) {
+Json JsonOf(const RemeshReport& report) {
+  return {{"num_quads", report.num_quads},
+          {"target_quads", report.target_quads},
+          {"components_in", report.topology_in.num_components},
+          {"components_out", report.topology_out.num_components},
+          {"genus_in", report.topology_in.genus},
+          {"genus_out", report.topology_out.genus},
+          {"area_ratio", {{"mean", report.mean_area_ratio}, {"worst", report.worst_area_ratio}}},
+          {"angle_deviation_deg",
+           {{"mean", report.mean_angle_deviation_deg}, {"worst", report.worst_angle_deviation_deg}}},
+          {"num_flipped", report.num_flipped},
+          {"distance_of_diagonal", {{"mean", report.mean_distance}, {"worst", report.worst_distance}}},
+          {"num_on_creases", report.num_on_creases},
+          {"warnings", report.Warnings()}};
+}
+
+std::string TextOf(const RemeshReport& report) {
+  return fmt::format(
+      "{} quads, genus {} (input {}), angles off 90 degrees by {:.1f} (worst {:.1f}), area ratio {:.2f} "
+      "(worst "
+      "{:.2f}), {} flipped, off the surface by {:.2g} of its box (worst {:.2g})",
+      report.num_quads, report.topology_out.genus, report.topology_in.genus, report.mean_angle_deviation_deg,
+      report.worst_angle_deviation_deg, report.mean_area_ratio, report.worst_area_ratio, report.num_flipped,
+      report.mean_distance, report.worst_distance);
+}
+
+absl::StatusOr<RemeshResult> ReadAndRemesh(Session& session, const std::string& path, uint32_t target_quads) {
+  TriangleReadNotes notes;
+  TESSERA_ASSIGN_OR_RETURN(const TriangleMesh mesh, ReadTriangleMesh(path, &notes));
+  if (notes.triangles_turned + notes.faces_fanned + notes.vertices_merged > 0) {
+    session.Note(fmt::format("{}: {} triangles turned, {} larger faces split, {} vertices merged", path,
+                             notes.triangles_turned, notes.faces_fanned, notes.vertices_merged));
+  }
+  TESSERA_ASSIGN_OR_RETURN(RemeshResult result,
+                           RemeshTriangles(mesh, {.target_quads = target_quads}, session.Context()));
+  for (const std::string& warning : result.report.Warnings()) {
+    session.Warn(fmt::format("{}: {}", path, warning));
+  }
+  return result;
+}
+
+struct ReadResult {
+  QuadMesh mesh;
+  bool remeshed = false;  // from triangles
+};
+
+// A built-in shape, a file of quads, or a file of triangles or mixed faces remeshed to `target_quads`, 0:
+// kDefaultRemeshQuads.
+absl::StatusOr<ReadResult> ReadMesh(Session& session, const std::string& mesh, uint32_t target_quads) {
+  ReadResult result;
   if (const std::optional<std::string> shape = BuiltinName(mesh)) {
-    return BuiltinShape(*shape);
+    TESSERA_ASSIGN_OR_RETURN(result.mesh, BuiltinShape(*shape));
+    return result;
   }
-  MeshReadNotes notes;
-  TESSERA_ASSIGN_OR_RETURN(QuadMesh read, ReadQuadMesh(mesh, &notes));
-  if (notes.faces_turned + notes.vertices_split + notes.vertices_dropped > 0) {
-    session.Note(fmt::format("{}: {} faces turned, {} vertices doubled, {} unused vertices left out", mesh,
-                             notes.faces_turned, notes.vertices_split, notes.vertices_dropped));
+  const std::string extension = MeshExtension(mesh);
+  const bool may_be_quads = extension != ".ply" && extension != ".gltf" && extension != ".glb";
+  if (may_be_quads) {
+    MeshReadNotes notes;
+    absl::StatusOr<QuadMesh> read = ReadQuadMesh(mesh, &notes);
+    if (read.ok() && notes.faces_turned + notes.vertices_split + notes.vertices_dropped > 0) {
+      session.Note(fmt::format("{}: {} faces turned, {} vertices doubled, {} unused vertices left out", mesh,
+                               notes.faces_turned, notes.vertices_split, notes.vertices_dropped));
+    }
+    if (read.ok() || notes.faces_not_quads == 0) {
+      TESSERA_ASSIGN_OR_RETURN(result.mesh, std::move(read));
+      return result;
+    }
   }
-  return read;
+  TESSERA_ASSIGN_OR_RETURN(
+      RemeshResult remeshed,
+      ReadAndRemesh(session, mesh, target_quads == 0 ? kDefaultRemeshQuads : target_quads));
+  session.Note(fmt::format("{}: not of quads, so it was remeshed: {}", mesh, TextOf(remeshed.report)));
+  result.mesh = std::move(remeshed.mesh);
+  result.remeshed = true;
+  return result;
+}
+
+struct RemeshFlags {
+  std::string input;
+  std::string output;
+  uint32_t target_quads = kDefaultRemeshQuads;
+};
+
+absl::Status RunRemesh(Session& session, const RemeshFlags& flags) {
+  if (MeshExtension(flags.output) != ".obj") {
+    return UsageError(fmt::format("-o \"{}\": expected a file ending in .obj", flags.output));
+  }
+  TESSERA_ASSIGN_OR_RETURN(const RemeshResult result,
+                           ReadAndRemesh(session, flags.input, flags.target_quads));
+  TESSERA_RETURN_IF_ERROR(WriteFileAtomically(flags.output, WriteObj(result.mesh)));
+  Json value = {{"file", flags.output}};
+  value.update(JsonOf(result.report));
+  value["stages"] = Session::JsonOfStages(session.FinishStages());
+  session.Answer(value, fmt::format("{}: {}", flags.output, TextOf(result.report)));
+  return absl::OkStatus();
 }
 
 struct DressFlags {
@@ -62,11 +149,14 @@ void AnswerDressed(Session& session, const DressFlags& flags, uint64_t num_quads
 
 absl::Status DressHere(Session& session, const DressFlags& flags) {
   TESSERA_ASSIGN_OR_RETURN(const Arrangement* arrangement, FindArrangement(flags.arrangement));
-  TESSERA_ASSIGN_OR_RETURN(const QuadMesh mesh, ReadMesh(session, flags.mesh));
+  TESSERA_ASSIGN_OR_RETURN(const ReadResult read, ReadMesh(session, flags.mesh, flags.target_quads));
+  // What was remeshed has the number of quads it is to have.
   const DressParams params{
-      .seed = flags.seed, .allow_breaks = flags.allow_breaks, .target_quads = flags.target_quads};
+      .seed = flags.seed,
+      .allow_breaks = flags.allow_breaks,
+      .target_quads = read.remeshed ? static_cast<uint32_t>(read.mesh.quads.size()) : flags.target_quads};
   TESSERA_ASSIGN_OR_RETURN(const DressResult result,
-                           DressMesh(mesh, *arrangement, params, session.Context()));
+                           DressMesh(read.mesh, *arrangement, params, session.Context()));
   TESSERA_ASSIGN_OR_RETURN(const std::string bytes, SerializeDressing(result.dressing));
   TESSERA_RETURN_IF_ERROR(WriteFileAtomically(flags.output, bytes));
   AnswerDressed(session, flags, result.dressing.tile.size(), result.breaks.size());
@@ -129,11 +219,13 @@ absl::Status RunRedress(Session& session, const RedressFlags& flags) {
   return absl::OkStatus();
 }
 
-absl::Status RunInfo(Session& session, const std::string& path) {
-  TESSERA_ASSIGN_OR_RETURN(const QuadMesh mesh, ReadMesh(session, path));
-  TESSERA_ASSIGN_OR_RETURN(const MeshInfo info, DescribeMesh(mesh));
+absl::Status RunInfo(Session& session, const std::string& path, uint32_t target_quads) {
+  TESSERA_ASSIGN_OR_RETURN(const ReadResult read, ReadMesh(session, path, target_quads));
+  TESSERA_ASSIGN_OR_RETURN(const MeshInfo info, DescribeMesh(read.mesh));
+  session.FinishStages();
   const Json value = {
       {"mesh", path},
+      {"remeshed", read.remeshed},
       {"num_vertices", info.num_vertices},
       {"num_quads", info.num_quads},
       {"num_edges", info.num_edges},
@@ -156,7 +248,10 @@ void AddMeshCommands(CLI::App& app, Session& session) {
   CLI::App* noun = app.add_subcommand("mesh", "Quad meshes and their dressings");
   noun->require_subcommand(1);
 
-  constexpr char kMeshHelp[] = "OBJ or OFF file of quads, or builtin:plane, torus, cube-sphere, genus3";
+  constexpr char kMeshHelp[] =
+      "OBJ or OFF file of quads, a closed mesh of triangles (OBJ, OFF, PLY, GLB, glTF), which is remeshed, "
+      "or "
+      "builtin:plane, torus, cube-sphere, genus3";
   const auto dress_flags = std::make_shared<DressFlags>();
   CLI::App* dress =
       noun->add_subcommand("dress", "Give each quad a tile of an arrangement; done here, once per mesh");
@@ -165,8 +260,9 @@ void AddMeshCommands(CLI::App& app, Session& session) {
   dress->add_option("--seed", dress_flags->seed, "Same seed, same dressing")->capture_default_str();
   dress->add_flag("--allow-breaks", dress_flags->allow_breaks,
                   "Accept edges where an unturned arrangement cannot match");
-  dress->add_option("--quads", dress_flags->target_quads,
-                    "Subdivide to about this many quads [built-in rule]");
+  dress->add_option(
+      "--quads", dress_flags->target_quads,
+      "Subdivide to about this many quads [built-in rule]; triangles are remeshed to it [4000]");
   dress->add_flag("--on-server", dress_flags->on_server, "Let the server do it");
   dress->add_option("-o,--output", dress_flags->output, "File to write, .tsra")->required();
   dress->callback([&session, dress_flags] {
@@ -186,10 +282,30 @@ void AddMeshCommands(CLI::App& app, Session& session) {
     session.run = [&session, redress_flags] { return RunRedress(session, *redress_flags); };
   });
 
+  const auto remesh_flags = std::make_shared<RemeshFlags>();
+  CLI::App* remesh = noun->add_subcommand(
+      "remesh",
+      "Turn a closed triangle mesh into quads of similar size; prints how far they are from squares");
+  remesh
+      ->add_option("MESH", remesh_flags->input,
+                   "OBJ, OFF, PLY, GLB or glTF file, at most 4 million triangles")
+      ->required();
+  remesh->add_option("--quads", remesh_flags->target_quads, "About this many, within 10 %")
+      ->capture_default_str();
+  remesh->add_option("-o,--output", remesh_flags->output, "File to write, .obj")->required();
+  remesh->callback([&session, remesh_flags] {
+    session.run = [&session, remesh_flags] { return RunRemesh(session, *remesh_flags); };
+  });
+
   const auto mesh = std::make_shared<std::string>();
+  const auto info_quads = std::make_shared<uint32_t>(kDefaultRemeshQuads);
   CLI::App* info = noun->add_subcommand("info", "Check a mesh and count what it is made of");
   info->add_option("MESH", *mesh, kMeshHelp)->required();
-  info->callback([&session, mesh] { session.run = [&session, mesh] { return RunInfo(session, *mesh); }; });
+  info->add_option("--quads", *info_quads, "Triangles are remeshed to about this many")
+      ->capture_default_str();
+  info->callback([&session, mesh, info_quads] {
+    session.run = [&session, mesh, info_quads] { return RunInfo(session, *mesh, *info_quads); };
+  });
 }
 
 }  // namespace tessera::cli

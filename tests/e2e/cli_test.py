@@ -94,6 +94,24 @@ class NoServerTest(harness.unittest.TestCase):
                                    str(folder / "t.tsra"))
             self.assertEqual(refused.code, 5, refused)
             self.assertIn("triangle.obj", refused.err)
+            self.assertIn("not closed", refused.err)
+            box = folder / "box.off"
+            box.write_text("OFF\n8 7 0\n" + "".join(f"{i & 1} {i >> 1 & 1} {i >> 2}\n" for i in range(8)) +
+                           "4 0 2 3 1\n4 4 5 7 6\n4 0 1 5 4\n4 2 6 7 3\n4 0 4 6 2\n3 1 3 7\n3 1 7 5\n")
+            quads = folder / "quads.obj"
+            report = self.tessera("mesh", "remesh", str(box), "--quads", 300, "-o", str(quads), "--json").json()
+            self.assertTrue(270 <= report["num_quads"] <= 330, report)
+            self.assertEqual((report["num_flipped"], report["genus_in"], report["genus_out"]), (0, 0, 0))
+            self.assertLess(report["angle_deviation_deg"]["mean"], 15)
+            info = self.tessera("mesh", "info", str(quads), "--json").json()
+            self.assertEqual((info["num_quads"], info["remeshed"]), (report["num_quads"], False))
+            dressed = folder / "box.tsra"
+            on_the_way = self.tessera("mesh", "dress", str(box), "--quads", 300, "--arrangement", "surface-96", "-o",
+                                      str(dressed), "--json")
+            self.assertEqual(on_the_way.json()["num_quads"], report["num_quads"])
+            self.assertIn("remeshed", on_the_way.err)
+            for path in (box, quads, dressed):
+                path.unlink()
             missing = self.tessera("mesh", "info", str(folder / "none.obj"))
             self.assertEqual(missing.code, 4, missing)
             unwritable = self.tessera("mesh", "dress", "builtin:torus", "--arrangement", "surface-96", "-o",
