@@ -232,7 +232,7 @@ double QuadRelaxer::Energy(size_t vertex) const {
     }
     const double size =
         std::log(std::max(shape.area, 1e-9 * mean_side_ * mean_side_) / (mean_side_ * mean_side_));
-    energy += 0.05 * size * size + (shape.flipped ? 100.0 : 0.0);
+    energy += 0.15 * size * size + (shape.flipped ? 100.0 : 0.0);
   }
   return energy;
 }

@@ -42,6 +42,8 @@ constexpr double kSizeStep = 0.008;
 constexpr size_t kMostCandidates = 8;
 // Numbers of quads this close to the target are as good as each other.
 constexpr double kQuadsSought = 0.06;
+// Missed shares of the surface up to this are as good as none.
+constexpr double kMissedSought = 0.002;
 // Estimates of the voxel size are corrected by their number of quads so often.
 constexpr int kCorrections = 4;
 
@@ -86,23 +88,22 @@ double EstimateCell(std::span<const Eigen::Vector3d> positions, std::span<const 
   return std::sqrt(shadows / target);
 }
 
-// Share of the surface's vertices that have no filled voxel in or beside theirs: parts too thin for the grid.
+// Share of the triangles whose first corner has no filled voxel at it or across a face of that: parts too
+// thin for the grid.
 double MissedShare(const VoxelGrid& grid, std::span<const Eigen::Vector3d> positions,
                    std::span<const Triangle> triangles) {
-  size_t missed = 0;
-  for (const Triangle& triangle : triangles) {
+  const std::array<Eigen::Vector3i, 7> steps{Eigen::Vector3i(0, 0, 0),  Eigen::Vector3i(1, 0, 0),
+                                             Eigen::Vector3i(-1, 0, 0), Eigen::Vector3i(0, 1, 0),
+                                             Eigen::Vector3i(0, -1, 0), Eigen::Vector3i(0, 0, 1),
+                                             Eigen::Vector3i(0, 0, -1)};
+  const auto missed = std::count_if(triangles.begin(), triangles.end(), [&](const Triangle& triangle) {
     const Eigen::Vector3i at =
         ((positions[triangle[0]] - grid.origin) / grid.cell).array().floor().cast<int>();
-    bool found = false;
-    for (int x = at.x() - 1; x <= at.x() + 1; ++x) {
-      for (int y = at.y() - 1; y <= at.y() + 1; ++y) {
-        for (int z = at.z() - 1; z <= at.z() + 1; ++z) {
-          found = found || grid.filled[grid.Index(x, y, z)] != 0;
-        }
-      }
-    }
-    missed += !found;
-  }
+    return std::none_of(steps.begin(), steps.end(), [&](const Eigen::Vector3i& step) {
+      const Eigen::Vector3i voxel = at + step;
+      return grid.filled[grid.Index(voxel.x(), voxel.y(), voxel.z())] != 0;
+    });
+  });
   return static_cast<double>(missed) / static_cast<double>(triangles.size());
 }
 
@@ -133,11 +134,12 @@ absl::StatusOr<std::vector<VoxelSurface>> VoxelCandidates(std::span<const Eigen:
       return 0;
     }
     const double miss = std::abs(num_quads / target - 1.0);
+    const double missed = MissedShare(grid, positions, triangles);
     Rank rank{.miss_of_target = miss > kQuadsSought ? miss : 0.0,
               .miss_of_components = static_cast<int64_t>(topology.num_components) -
                                     static_cast<int64_t>(surface.topology.num_components),
               .miss_of_genus = std::abs(surface.topology.genus - topology.genus),
-              .missed_share = MissedShare(grid, positions, triangles),
+              .missed_share = missed > kMissedSought ? missed : 0.0,
               .irregular_share = static_cast<double>(surface.num_irregular_vertices) / num_quads};
     const auto place = std::upper_bound(found.begin(), found.end(), rank,
                                         [](const Rank& a, const auto& b) { return a < b.first; });
