@@ -341,6 +341,8 @@ absl::StatusOr<RemeshResult> RemeshTriangles(const TriangleMesh& mesh, const Rem
     result.mesh.positions.push_back((unit.centre + unit.scale * p).cast<float>());
   }
   result.mesh.normals = ComputeNormals(result.mesh);
+  // Rounded to float32, sides may lose their length far from the origin.
+  TESSERA_RETURN_IF_ERROR(ValidateQuadMesh(result.mesh));
   if (first_flipped) {
     const Eigen::Vector3f& at = result.mesh.positions[result.mesh.quads[*first_flipped][0]];
     return absl::FailedPreconditionError(absl::StrFormat(

@@ -67,10 +67,11 @@ struct RemeshResult {
 
 // Quads about `params.target_quads`; vertices lie on the surface, on its sharp edges (40 degrees and more)
 // where that leaves the quads in shape. Among sizes and places of the voxels those are taken that keep the
-// number of components and handles, with the fewest irregular vertices. Errors: INVALID_ARGUMENT (the target
-// is outside the limits above, no volume, and what CheckClosedSurface refuses), RESOURCE_EXHAUSTED naming the
-// number of voxels and the limit, FAILED_PRECONDITION naming the first quad and the number of quads that stay
-// flipped, INTERNAL when Embree fails, CANCELLED. Cost: seconds for 10 000 quads.
+// number of components and handles and miss few thin parts, with the fewest irregular vertices. Errors:
+// INVALID_ARGUMENT (the target is outside the limits above, no volume, so far from the origin that a side is
+// lost to rounding, and what CheckClosedSurface refuses), RESOURCE_EXHAUSTED naming the number of voxels and
+// the limit, FAILED_PRECONDITION naming the first quad's place and the number of quads that stay flipped,
+// INTERNAL when Embree fails, CANCELLED. Cost: seconds for 10 000 quads.
 [[nodiscard]] absl::StatusOr<RemeshResult> RemeshTriangles(const TriangleMesh& mesh,
                                                            const RemeshParams& params,
                                                            const RunContext& context);
