@@ -14,13 +14,13 @@ int RoundUp(int n, int multiple) {
 
 }  // namespace
 
-Exemplar::Exemplar(const Embedding& embedding, SeamRule seam_rule)
+Exemplar::Exemplar(const Embedding& embedding, SeamRule seam_rule, int cut_dims)
     : seam_rule_(seam_rule),
       width_(embedding.width),
       height_(embedding.height),
-      dims_(RoundUp(std::min(embedding.dims, kCutDims), kLane)),
-      search_dims_(std::min(embedding.dims, kSearchDims)) {
-  const int used = std::min(embedding.dims, kCutDims);
+      dims_(RoundUp(std::min(embedding.dims, cut_dims), kLane)),
+      search_dims_(std::min({embedding.dims, cut_dims, kSearchDims})) {
+  const int used = std::min(embedding.dims, cut_dims);
   values_.assign(size_t{4} * num_pixels() * dims_, 0.0f);
   for (size_t point = 0; point < size_t{4} * num_pixels(); ++point) {
     std::copy_n(embedding.values.data() + point * embedding.dims, used, values_.data() + point * dims_);

@@ -39,8 +39,9 @@ constexpr uint32_t TurnTexel(uint32_t texel, int turns) {
 
 class Exemplar {
  public:
-  // Takes the first kCutDims dimensions; an embedding may have fewer.
-  explicit Exemplar(const Embedding& embedding, SeamRule seam_rule = SeamRule::kExcess);
+  // Takes the first `cut_dims` dimensions, at least 1; an embedding may have fewer.
+  explicit Exemplar(const Embedding& embedding, SeamRule seam_rule = SeamRule::kExcess,
+                    int cut_dims = kCutDims);
 
   [[nodiscard]] SeamRule seam_rule() const { return seam_rule_; }
   [[nodiscard]] int width() const { return width_; }

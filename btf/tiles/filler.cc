@@ -18,12 +18,12 @@ constexpr double kLargestWindowShare = 0.75;
 constexpr int kFirstFeatures = 5;
 // Share of a first window that should be known already; below it a place is less wanted.
 constexpr double kWantedOverlap = 0.15;
-constexpr int kPatchCandidates = 24;  // kept by a search
+constexpr int kKeptPerCut = 3;  // candidates that a search keeps for each that is cut
 
 // How a window is matched. First windows bring most of the content, so they range far and pay for repetition;
 // improvements look for the best fit.
 struct Matching {
-  int trials = 0;            // candidates that are cut
+  int trials = 0;            // candidates that are cut, of eight asked for
   double repetition = 0.0;   // price of a patch used as often as the mean
   double temperature = 0.0;  // of the draw among candidates
   int separation = 0;        // of candidates, in eighths of a feature
@@ -138,9 +138,11 @@ int MatchWindow(const FillParams& params, const Window& window, const Matching& 
                 FillReport& report) {
   MakeQuery(canvas, window, scratch.query);
   const int separation = std::max(1, matching.separation * params.feature_size / 8);
-  std::vector<Candidate> candidates = scratch.search.Search(
-      scratch.query, params.turns, params.usage, matching.repetition, kPatchCandidates, separation, stop);
-  candidates = SampleCandidates(std::move(candidates), matching.trials, matching.temperature, rng);
+  std::vector<Candidate> candidates =
+      scratch.search.Search(scratch.query, params.turns, params.usage, matching.repetition,
+                            kKeptPerCut * params.num_candidates, separation, stop);
+  const int trials = (matching.trials * params.num_candidates + 7) / 8;
+  candidates = SampleCandidates(std::move(candidates), trials, matching.temperature, rng);
   std::optional<Patch> best_patch;
   PatchCut best_cut;
   bool best_repeats = false;

@@ -25,6 +25,7 @@ struct FillParams {
   uint64_t seed = 1;
   double mean_threshold = 0.0;         // of FillReport.mean_mismatch
   double texel_threshold = 0.0;        // of FillReport.largest_mismatch
+  int num_candidates = 8;              // SynthesisParams::num_candidates
   const UsageMap* usage = nullptr;     // makes places used often dearer
   const Siblings* siblings = nullptr;  // patches that repeat one are laid only where no other was found
 };

@@ -9,6 +9,7 @@
 #include "btf/base/reason.h"
 #include "btf/base/rng.h"
 #include "btf/base/status_macros.h"
+#include "btf/tiles/diamonds.h"
 #include "btf/tiles/frames.h"
 #include "btf/tiles/interior.h"
 
@@ -51,6 +52,13 @@ absl::Status CheckSizes(int exemplar_width, int exemplar_height, const Synthesis
     return absl::InvalidArgumentError(absl::StrFormat("thresholds %g and %g: must be above 0",
                                                       params.mean_threshold, params.texel_threshold));
   }
+  if (params.num_candidates < 1) {
+    return absl::InvalidArgumentError(
+        absl::StrFormat("%d candidates: must be at least 1", params.num_candidates));
+  }
+  if (params.method != SynthesisMethod::kFrame) {
+    return CheckDiamondSizes(exemplar_width, exemplar_height, params);
+  }
   const int needed = std::max(kSmallestExemplar, 2 * height);
   if (exemplar_width < needed || exemplar_height < needed) {
     return WithReason(absl::InvalidArgumentError(
@@ -64,6 +72,9 @@ absl::Status CheckSizes(int exemplar_width, int exemplar_height, const Synthesis
 absl::StatusOr<IndexMaps> SynthesizeIndexMaps(const Exemplar& exemplar, const Arrangement& arrangement,
                                               const SynthesisParams& params, const RunContext& context) {
   TESSERA_RETURN_IF_ERROR(CheckSizes(exemplar.width(), exemplar.height(), params));
+  if (params.method != SynthesisMethod::kFrame) {
+    return SynthesizeDiamonds(exemplar, arrangement, params, context);
+  }
   const int num_tiles = static_cast<int>(arrangement.codes.size());
   const int num_strips = NumStrips(arrangement);
   const int size = params.tile_size;
@@ -106,6 +117,7 @@ absl::StatusOr<IndexMaps> SynthesizeIndexMaps(const Exemplar& exemplar, const Ar
     fill.seed = Mix64(Mix64(params.seed, stage), static_cast<uint64_t>(item));
     fill.mean_threshold = params.mean_threshold;
     fill.texel_threshold = params.texel_threshold;
+    fill.num_candidates = params.num_candidates;
     return fill;
   };
 

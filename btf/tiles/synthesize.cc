@@ -6,6 +6,7 @@
 
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_format.h>
+#include <absl/strings/str_join.h>
 
 #include "btf/base/reason.h"
 #include "btf/base/status_macros.h"
@@ -96,6 +97,50 @@ nlohmann::json DescribeReports(const IndexMaps& maps) {
 
 }  // namespace
 
+std::string_view SynthesisMethodName(SynthesisMethod method) {
+  switch (method) {
+    case SynthesisMethod::kDiamondDp:
+      return "diamond-dp";
+    case SynthesisMethod::kDiamondCut:
+      return "diamond-cut";
+    case SynthesisMethod::kFrame:
+      break;
+  }
+  return "frame";
+}
+
+absl::StatusOr<SynthesisMethod> ParseSynthesisMethod(std::string_view name) {
+  std::vector<std::string> known;
+  for (const SynthesisMethod method : kSynthesisMethods) {
+    if (name == SynthesisMethodName(method)) {
+      return method;
+    }
+    known.emplace_back(SynthesisMethodName(method));
+  }
+  return absl::InvalidArgumentError(
+      absl::StrFormat("unknown method \"%s\", known: %s", std::string(name), absl::StrJoin(known, ", ")));
+}
+
+TileSet TileSetOfMaps(const Material& material, const Arrangement& arrangement, const IndexMaps& maps,
+                      const SynthesisParams& params) {
+  TileSet set;
+  set.arrangement_id = arrangement.id;
+  set.arrangement_sha256 = arrangement.sha256;
+  set.tile_size = params.tile_size;
+  set.strip_height = params.strip_height;
+  set.tile_codes = arrangement.codes;
+  set.provenance = material.provenance;
+  set.radiometry = material.radiometry;
+  Referenced referenced = KeepReferenced(material.btfels, maps.texels);
+  set.btfels = std::move(referenced.table);
+  set.source_pixels = std::move(referenced.pixels);
+  set.tile_index.reserve(maps.texels.size());
+  for (const uint32_t texel : maps.texels) {
+    set.tile_index.push_back(PackTexel(referenced.index_of_pixel[BtfelOfTexel(texel)], TurnsOfTexel(texel)));
+  }
+  return set;
+}
+
 absl::StatusOr<TileSet> SynthesizeTileSet(const Material& material, const Arrangement& arrangement,
                                           const SynthesisParams& params, const RunContext& context) {
   TESSERA_RETURN_IF_ERROR(CheckSizes(material.width, material.height, params));
@@ -128,22 +173,7 @@ absl::StatusOr<TileSet> SynthesizeTileSet(const Material& material, const Arrang
 
   TESSERA_ASSIGN_OR_RETURN(const IndexMaps maps, SynthesizeIndexMaps(exemplar, arrangement, params, context));
 
-  TileSet set;
-  set.arrangement_id = arrangement.id;
-  set.arrangement_sha256 = arrangement.sha256;
-  set.tile_size = params.tile_size;
-  set.strip_height = params.strip_height;
-  set.tile_codes = arrangement.codes;
-  set.provenance = material.provenance;
-  set.radiometry = material.radiometry;
-  Referenced referenced = KeepReferenced(material.btfels, maps.texels);
-  set.btfels = std::move(referenced.table);
-  set.source_pixels = std::move(referenced.pixels);
-  set.tile_index.reserve(maps.texels.size());
-  for (const uint32_t texel : maps.texels) {
-    set.tile_index.push_back(PackTexel(referenced.index_of_pixel[BtfelOfTexel(texel)], TurnsOfTexel(texel)));
-  }
-
+  TileSet set = TileSetOfMaps(material, arrangement, maps, params);
   TESSERA_ASSIGN_OR_RETURN(Certificate certificate,
                            CertifyTiles(material, exemplar, arrangement, maps, params.strip_height,
                                         CertificateImages::kStratified, context));
@@ -152,11 +182,13 @@ absl::StatusOr<TileSet> SynthesizeTileSet(const Material& material, const Arrang
 
   set.metadata = DescribeReports(maps);
   set.metadata["seed"] = params.seed;
+  set.metadata["method"] = SynthesisMethodName(params.method);
   set.metadata["parameters"] = {{"tile_size", params.tile_size},
                                 {"strip_height", params.strip_height},
                                 {"mean_threshold", params.mean_threshold},
                                 {"texel_threshold", params.texel_threshold},
                                 {"seam_rule", params.seam_rule == SeamRule::kExcess ? "excess" : "mismatch"},
+                                {"num_candidates", params.num_candidates},
                                 {"force", params.force}};
   set.metadata["exemplar"] = {{"width", material.width}, {"height", material.height}};
   set.metadata["captured_variance"] = {{"search_dims", exemplar.search_dims()},
@@ -167,10 +199,18 @@ absl::StatusOr<TileSet> SynthesizeTileSet(const Material& material, const Arrang
                                 {"pattern", anisotropy.pattern},
                                 {"mean", anisotropy.mean},
                                 {"limit", kAnisotropyLimit}};
+  const bool is_frame = params.method == SynthesisMethod::kFrame;
+  if (!is_frame) {
+    set.metadata["diamonds"] = {{"draws", maps.diamonds.num_draws},
+                                {"most_draws", params.diamonds.num_draws},
+                                {"overlap_error", maps.diamonds.overlap_error},
+                                {"largest_error", params.diamonds.largest_error},
+                                {"accepted", maps.diamonds.accepted}};
+  }
+  const int cut_length = (is_frame ? params.strip_height : params.tile_size) / 2;
   set.metadata["corners"] = {
-      {"mean_mismatch",
-       MismatchOfCost(static_cast<double>(maps.corner_cost)) /
-           static_cast<double>(std::max<int64_t>(1, maps.corner_seams) * params.strip_height / 2)}};
+      {"mean_mismatch", MismatchOfCost(static_cast<double>(maps.corner_cost)) /
+                            static_cast<double>(std::max<int64_t>(1, maps.corner_seams) * cut_length)}};
   return set;
 }
 

@@ -6,7 +6,9 @@
 //   uint32_t texel = set.texel(tile, x, y);   // a BTFel of set.btfels and its quarter turns
 #pragma once
 
+#include <array>
 #include <cstdint>
+#include <string_view>
 
 #include <absl/status/statusor.h>
 
@@ -18,14 +20,35 @@
 
 namespace tessera {
 
+// kFrame is ours; the others are baselines, see diamonds.h.
+enum class SynthesisMethod { kFrame, kDiamondDp, kDiamondCut };
+inline constexpr std::array kSynthesisMethods = {SynthesisMethod::kFrame, SynthesisMethod::kDiamondDp,
+                                                 SynthesisMethod::kDiamondCut};
+// "frame", "diamond-dp", "diamond-cut".
+[[nodiscard]] std::string_view SynthesisMethodName(SynthesisMethod method);
+// Errors: INVALID_ARGUMENT naming the method and those known.
+[[nodiscard]] absl::StatusOr<SynthesisMethod> ParseSynthesisMethod(std::string_view name);
+
+struct DiamondParams {
+  // A set of samples is taken once the error of all its overlaps is below this, in units of the mean squared
+  // distance of two texels drawn at random: d_max of [PCAWang] 4.1.
+  double largest_error = 0.5;
+  int num_draws = 256;  // sets drawn while none is; then the best of them is taken
+};
+
 struct SynthesisParams {
-  int tile_size = 64;     // w, texels, at least 2 h
-  int strip_height = 16;  // h, texels, even, at least 8: about the size of a feature
+  int tile_size = 64;     // w, texels, at least 2 h; even for diamonds
+  int strip_height = 16;  // h, texels, even, at least 8: about the size of a feature; overlap of diamonds
   uint64_t seed = 1;
   // Synthesise turned strips of an anisotropic material all the same, and keep strips and tiles that miss a
   // threshold: metadata.thresholds_reached tells.
   bool force = false;
+  SynthesisMethod method = SynthesisMethod::kFrame;
   SeamRule seam_rule = SeamRule::kExcess;
+  // Patches cut for each first window, the cheapest of which is laid; three eighths of it, rounded up, for
+  // each improvement. At least 1.
+  int num_candidates = 8;
+  DiamondParams diamonds;
   // A filled strip or tile must reach both. In units of the material's mean embedding distance of
   // neighbouring texels:
   double mean_threshold = 3.0;  // mean cost along cuts, a mismatch or its excess
@@ -35,14 +58,14 @@ struct SynthesisParams {
 
 // Every texel of the result is a BTFel of `material` with a turn (0 throughout for "plane-*"); the table
 // keeps the referenced BTFels in ascending exemplar order. Same material, arrangement and parameters give the
-// same bytes for any number of threads. Metadata: seed, parameters, anisotropy, captured variance, thresholds
-// and what was reached; certificate: see certificate.h.
+// same bytes for any number of threads. Metadata: seed, method, parameters, anisotropy, captured variance,
+// thresholds and what was reached; certificate: see certificate.h.
 //
 // Errors, with reasons as in btf/base/reason.h: INVALID_ARGUMENT naming the size and its limit (reason
 // MATERIAL_TOO_SMALL when the exemplar is the cause) or an unknown codec; FAILED_PRECONDITION with reason
 // NOT_ISOTROPIC (turned strips only, unless forced) or THRESHOLD_NOT_REACHED (unless forced), each with its
 // figures; CANCELLED within one patch search. Progress: stages "corners", "strips", "tiles" and
-// "certificate".
+// "certificate"; "samples" of diamonds, which miss no threshold.
 [[nodiscard]] absl::StatusOr<TileSet> SynthesizeTileSet(const Material& material,
                                                         const Arrangement& arrangement,
                                                         const SynthesisParams& params,

@@ -23,6 +23,7 @@ struct SynthesizeFlags {
   uint32_t tile_size = 64;
   uint32_t strip_height = 16;
   uint64_t seed = 1;
+  std::string method = "frame";
   bool force = false;
   bool detach = false;
   bool replace = false;
@@ -53,6 +54,7 @@ absl::Status RunSynthesize(Session& session, const SynthesizeFlags& flags) {
   request.set_tile_size(flags.tile_size);
   request.set_strip_height(flags.strip_height);
   request.set_seed(flags.seed);
+  request.set_method(flags.method);
   request.set_force(flags.force);
   request.set_replace(flags.replace);
   TESSERA_ASSIGN_OR_RETURN(const v1::Job job, client->SynthesizeTileSet(request, context));
@@ -193,6 +195,11 @@ void AddSynthesize(CLI::App& noun, Session& session) {
                    "Height of the strips in texels: even, from 8; about a feature")
       ->capture_default_str();
   command->add_option("--seed", flags->seed, "Same seed, same tile set")->capture_default_str();
+  command
+      ->add_option("--method", flags->method,
+                   "frame, or a baseline: four diamonds cut by dynamic programming or by a minimum cut")
+      ->check(CLI::IsMember({"frame", "diamond-dp", "diamond-cut"}))
+      ->capture_default_str();
   command->add_flag("--force", flags->force, "Turn strips of a material that is not isotropic all the same");
   command->add_flag("--detach", flags->detach, "Print the job and return at once");
   command->add_flag("--replace", flags->replace, "Take a name that exists");

@@ -30,7 +30,7 @@ void FillDefaults(v1::SynthesizeTileSetRequest& request) {
     request.set_strip_height(defaults.strip_height);
   }
   if (request.method().empty()) {
-    request.set_method("frame");
+    request.set_method(std::string(SynthesisMethodName(defaults.method)));
   }
 }
 
@@ -40,8 +40,9 @@ absl::Status CheckSynthesizeRequest(const v1::SynthesizeTileSetRequest& request)
   const auto refuse = [](const std::string& message, std::string_view field) {
     return WithReason(absl::InvalidArgumentError(message), "ARGUMENT_INVALID", field);
   };
-  if (filled.method() != "frame") {
-    return refuse(absl::StrCat("unknown method \"", filled.method(), "\", known: frame"), "method");
+  const absl::StatusOr<SynthesisMethod> method = ParseSynthesisMethod(filled.method());
+  if (!method.ok()) {
+    return refuse(std::string(method.status().message()), "method");
   }
   if (filled.strip_height() < kMinStripHeight || filled.strip_height() % 2 != 0) {
     return refuse(absl::StrCat("strip_height ", filled.strip_height(),
@@ -51,6 +52,11 @@ absl::Status CheckSynthesizeRequest(const v1::SynthesizeTileSetRequest& request)
   if (filled.tile_size() > kMaxTileSize || filled.tile_size() < 2 * uint64_t{filled.strip_height()}) {
     return refuse(absl::StrCat("tile_size ", filled.tile_size(), ", expected twice the strip height (",
                                2 * uint64_t{filled.strip_height()}, ") to ", kMaxTileSize),
+                  "tile_size");
+  }
+  if (*method != SynthesisMethod::kFrame && filled.tile_size() % 2 != 0) {
+    return refuse(absl::StrCat("tile_size ", filled.tile_size(), ", expected an even number for method \"",
+                               filled.method(), "\""),
                   "tile_size");
   }
   return absl::OkStatus();
@@ -72,6 +78,7 @@ absl::StatusOr<JobOutput> RunSynthesizeJob(const JobInput& input, const JobConte
   params.strip_height = static_cast<int>(request.strip_height());
   params.seed = request.seed();
   params.force = request.force();
+  TESSERA_ASSIGN_OR_RETURN(params.method, ParseSynthesisMethod(request.method()));
   TESSERA_ASSIGN_OR_RETURN(TileSet tile_set, SynthesizeTileSet(material, *arrangement, params, context.run));
   tile_set.metadata[kMaterialDigestKey] = input.inputs[0];
   TESSERA_ASSIGN_OR_RETURN(std::string container, SerializeTileSet(tile_set));

@@ -126,6 +126,28 @@ TEST(SynthesizeTileSetTest, EveryTexelIsABtfelOfTheMaterial) {
   EXPECT_GT(set->certificate["borders"]["verbatim_share"].get<double>(), 0.0);
 }
 
+TEST(SynthesizeTileSetTest, DiamondsAreNamedInTheMetadataAndShowTheirSeamsMore) {
+  const Material material = MakeMaterial(48, 48, Pattern::kBumps);
+  const Arrangement& arrangement = **FindArrangement("plane-16");
+  SynthesisParams params = SmallParams();
+  params.tile_size = 32;
+  const absl::StatusOr<TileSet> frame = SynthesizeTileSet(material, arrangement, params, RunContext{});
+  ASSERT_TRUE(frame.ok()) << frame.status();
+  EXPECT_EQ(frame->metadata["method"], "frame");
+  EXPECT_FALSE(frame->metadata.contains("diamonds"));
+  const double ours = frame->certificate["insides"]["ratio"].get<double>();
+  params.seam_rule = SeamRule::kMismatch;
+  for (const SynthesisMethod method : {SynthesisMethod::kDiamondDp, SynthesisMethod::kDiamondCut}) {
+    params.method = method;
+    const absl::StatusOr<TileSet> diamonds = SynthesizeTileSet(material, arrangement, params, RunContext{});
+    ASSERT_TRUE(diamonds.ok()) << diamonds.status();
+    EXPECT_EQ(diamonds->metadata["method"], SynthesisMethodName(method));
+    EXPECT_GT(diamonds->metadata["diamonds"]["draws"].get<int>(), 0);
+    EXPECT_GT(diamonds->certificate["insides"]["ratio"].get<double>(), 1.1 * ours);
+    EXPECT_TRUE(SerializeTileSet(*diamonds).ok());
+  }
+}
+
 TEST(SynthesizeTileSetTest, IsCertifiedAgainByItsOwnMaterialOnly) {
   const Material material = MakeMaterial(40, 36, Pattern::kBumps);
   absl::StatusOr<TileSet> set =

@@ -113,6 +113,19 @@ TEST_F(ServerTest, WrongArgumentsAreRefusedBeforeAnyJob) {
   EXPECT_EQ(synthesize(), "ARGUMENT_INVALID");
   synthesis.set_strip_height(40);
   EXPECT_EQ(synthesize(), "ARGUMENT_INVALID");
+  synthesis.set_strip_height(0);
+  for (const char* const method : {"frame", "diamond-dp", "diamond-cut"}) {
+    synthesis.set_method(method);
+    EXPECT_EQ(synthesize(), "NOT_FOUND") << method;
+  }
+  synthesis.set_tile_size(63);
+  EXPECT_EQ(synthesize(), "ARGUMENT_INVALID") << "diamonds are of even size";
+  synthesis.set_tile_size(64);
+  synthesis.set_method("hexagon");
+  EXPECT_EQ(synthesize(), "ARGUMENT_INVALID");
+  const absl::Status unknown =
+      Stubs::Call(&v1::TileSets::Stub::SynthesizeTileSet, *stubs_->tile_sets, synthesis).status();
+  EXPECT_NE(unknown.message().find("unknown method \"hexagon\", known: frame"), std::string::npos) << unknown;
   synthesis.set_name("arrangements/nowhere/tileSets/");
   EXPECT_EQ(synthesize(), "NOT_FOUND");
 
