@@ -87,7 +87,8 @@ double ReferencedShare(const Exemplar& exemplar, const IndexMaps& maps) {
   return static_cast<double>(std::ranges::count(referenced, true)) / exemplar.num_pixels();
 }
 
-// As Certificate::heat.
+}  // namespace
+
 std::vector<uint8_t> HeatOf(std::span<const SeamMeter* const> meters, size_t num_texels) {
   std::vector<SeamMeter::Sums> sums(num_texels);
   for (const SeamMeter* const meter : meters) {
@@ -105,7 +106,25 @@ std::vector<uint8_t> HeatOf(std::span<const SeamMeter* const> meters, size_t num
   return heat;
 }
 
-}  // namespace
+void DecodeExemplarImages(const Decoder& decoder, const BtfelTable& table, std::span<const ImagePair> pairs,
+                          const RunContext& context, std::span<ExemplarImage> images) {
+  const size_t k = table.num_coefficients;
+  ParallelFor(context, 0, static_cast<int64_t>(table.size()), kTexelsPerBlock,
+              [&](int64_t begin, int64_t end) {
+                const auto count = static_cast<size_t>(end - begin);
+                const std::span<const uint8_t> codes = std::span(table.codes).subspan(begin * k, count * k);
+                for (size_t i = 0; i < images.size(); ++i) {
+                  const Eigen::Vector3d light = VectorFromDirection(table.lights[pairs[i].light]);
+                  const Eigen::Vector3d view = VectorFromDirection(table.views[pairs[i].view]);
+                  for (int turn = 0; turn < 4; ++turn) {
+                    if (!images[i].rgb[turn].empty()) {
+                      decoder.DecodeTexels(codes, light, view, turn,
+                                           std::span(images[i].rgb[turn]).subspan(3 * begin, 3 * count));
+                    }
+                  }
+                }
+              });
+}
 
 std::vector<ImagePair> ChooseImages(int num_views, int num_lights, CertificateImages which) {
   std::vector<ImagePair> images;
@@ -359,7 +378,6 @@ absl::StatusOr<Certificate> CertifyTiles(const Material& material, const Exempla
   meters.emplace_back(exemplar, std::move(joins.straight_cuts));
 
   const BtfelTable& table = material.btfels;
-  const size_t k = table.num_coefficients;
   const std::vector<ImagePair> pairs =
       ChooseImages(static_cast<int>(table.views.size()), static_cast<int>(table.lights.size()), which);
   std::vector<ExemplarImage> images(std::min<size_t>(kImagesAtOnce, pairs.size()));
@@ -371,20 +389,7 @@ absl::StatusOr<Certificate> CertifyTiles(const Material& material, const Exempla
   for (size_t first = 0; first < pairs.size(); first += images.size()) {
     context.Report("certificate", static_cast<int64_t>(first), static_cast<int64_t>(pairs.size()), "images");
     images.resize(std::min(images.size(), pairs.size() - first));
-    ParallelFor(context, 0, exemplar.num_pixels(), kTexelsPerBlock, [&](int64_t begin, int64_t end) {
-      const auto count = static_cast<size_t>(end - begin);
-      const std::span<const uint8_t> codes = std::span(table.codes).subspan(begin * k, count * k);
-      for (size_t i = 0; i < images.size(); ++i) {
-        const Eigen::Vector3d light = VectorFromDirection(table.lights[pairs[first + i].light]);
-        const Eigen::Vector3d view = VectorFromDirection(table.views[pairs[first + i].view]);
-        for (int turn = 0; turn < 4; ++turn) {
-          if (turn_occurs[turn]) {
-            decoder->DecodeTexels(codes, light, view, turn,
-                                  std::span(images[i].rgb[turn]).subspan(3 * begin, 3 * count));
-          }
-        }
-      }
-    });
+    DecodeExemplarImages(*decoder, table, std::span(pairs).subspan(first, images.size()), context, images);
     TESSERA_RETURN_IF_ERROR(context.CheckStop());
     for (SeamMeter& meter : meters) {
       meter.Add(images, context);

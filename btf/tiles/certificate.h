@@ -25,6 +25,7 @@
 #include <nlohmann/json.hpp>
 
 #include "btf/base/run_context.h"
+#include "btf/codec/decoder.h"
 #include "btf/codec/material.h"
 #include "btf/tiles/exemplar.h"
 #include "btf/tiles/index_maps.h"
@@ -53,6 +54,10 @@ struct ImagePair {
 struct ExemplarImage {
   std::array<std::vector<float>, 4> rgb;
 };
+
+// Decodes images[i] under pairs[i], all texels, in those turns whose `rgb` has room for them already.
+void DecodeExemplarImages(const Decoder& decoder, const BtfelTable& table, std::span<const ImagePair> pairs,
+                          const RunContext& context, std::span<ExemplarImage> images);
 
 // A cut pair, q in `direction` (GridCut::Direction) from p.
 struct CutPair {
@@ -111,6 +116,9 @@ class SeamMeter {
   std::vector<Sums> by_pair_;
   std::vector<Sums> by_image_;
 };
+
+// As Certificate::heat, of meters whose seams have places among `num_texels`.
+[[nodiscard]] std::vector<uint8_t> HeatOf(std::span<const SeamMeter* const> meters, size_t num_texels);
 
 struct Certificate {
   // Keys: images {count, of, rule}; referenced_share (of the exemplar's texels); `borders` and `insides` as

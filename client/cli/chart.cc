@@ -1,5 +1,6 @@
-// tessera chart codecs
+// tessera chart codecs | synthesis
 #include <algorithm>
+#include <cctype>
 #include <filesystem>
 #include <memory>
 #include <optional>
@@ -10,8 +11,10 @@
 #include "btf/base/atomic_file.h"
 #include "btf/base/status_macros.h"
 #include "btf/chart/codec_chart.h"
+#include "btf/chart/synthesis_chart.h"
 #include "btf/data/half_btf.h"
 #include "btf/data/import.h"
+#include "btf/image/image_io.h"
 #include "btf/meso/generated_source.h"
 #include "btf/render/offscreen_context.h"
 #include "client/cli/commands.h"
@@ -152,23 +155,37 @@ std::string SummaryOf(const std::vector<PaperRow>& rows) {
   return TextTable(table);
 }
 
-absl::Status RunChart(Session& session, const ChartFlags& flags) {
-  const bool has_paper = flags.paper || flags.paper_largest;
-  if (flags.sources.empty() && !has_paper) {
-    return UsageError("chart codecs: no SOURCE, and neither --paper nor --paper-largest");
+// What both charts do before they measure: the sources are told apart, the folder exists.
+absl::Status Prepare(const ChartFlags& flags, const char* command) {
+  if (flags.sources.empty() && !flags.paper && !flags.paper_largest) {
+    return UsageError(fmt::format("{}: no SOURCE, and neither --paper nor --paper-largest", command));
   }
   const std::set<std::string> different(flags.sources.begin(), flags.sources.end());
   if (different.size() != flags.sources.size()) {
-    return UsageError("chart codecs: a SOURCE is given twice");
+    return UsageError(fmt::format("{}: a SOURCE is given twice", command));
   }
   std::error_code error;
   std::filesystem::create_directories(flags.folder, error);
   if (error) {
     return absl::InvalidArgumentError(fmt::format("{}: {}", flags.folder, error.message()));
   }
-  const std::string csv_path = (std::filesystem::path(flags.folder) / "codecs.csv").string();
-  const std::string html_path = (std::filesystem::path(flags.folder) / "codecs.html").string();
-  const std::string paper_path = (std::filesystem::path(flags.folder) / "paper.csv").string();
+  return absl::OkStatus();
+}
+
+std::string PathIn(const ChartFlags& flags, const std::string& file) {
+  return (std::filesystem::path(flags.folder) / file).string();
+}
+
+PaperSize PaperSizeOf(const ChartFlags& flags) {
+  return flags.paper_largest ? PaperSize::kAll : PaperSize::kWithoutLargest;
+}
+
+absl::Status RunCodecs(Session& session, const ChartFlags& flags) {
+  const bool has_paper = flags.paper || flags.paper_largest;
+  TESSERA_RETURN_IF_ERROR(Prepare(flags, "chart codecs"));
+  const std::string csv_path = PathIn(flags, "codecs.csv");
+  const std::string html_path = PathIn(flags, "codecs.html");
+  const std::string paper_path = PathIn(flags, "paper.csv");
   // A folder that takes no file shows now, not in ten minutes.
   TESSERA_RETURN_IF_ERROR(AtomicFile::Create(html_path).status());
 
@@ -189,9 +206,7 @@ absl::Status RunChart(Session& session, const ChartFlags& flags) {
   }
   std::vector<PaperRow> paper;
   if (has_paper) {
-    TESSERA_ASSIGN_OR_RETURN(
-        paper,
-        RunPaperTable(flags.paper_largest ? PaperSize::kAll : PaperSize::kWithoutLargest, session.Context()));
+    TESSERA_ASSIGN_OR_RETURN(paper, RunPaperTable(PaperSizeOf(flags), session.Context()));
     summaries.push_back(SummaryOf(paper));
   }
   TESSERA_ASSIGN_OR_RETURN(const std::string html, CodecsHtml(charts, paper));
@@ -215,31 +230,150 @@ absl::Status RunChart(Session& session, const ChartFlags& flags) {
   return absl::OkStatus();
 }
 
+std::string SummaryOf(const SynthesisChart& chart) {
+  std::vector<std::vector<std::string>> table = {{"METHOD", "DIMS", "CANDIDATES", "STRIP", "SEED", "SECONDS",
+                                                  "R BORDERS", "R WITHIN", "CUT %", "SEEN", "FULL",
+                                                  "REPETITION"}};
+  for (const SynthesisPoint& point : chart.points) {
+    const SynthesisSetting& setting = point.setting;
+    table.push_back({point.charted().name, fmt::format("{}", setting.dims),
+                     fmt::format("{}", setting.candidates), fmt::format("{}", setting.strip_height),
+                     fmt::format("{}", setting.seed), fmt::format("{:.2f}", point.seconds),
+                     fmt::format("{:.3f}", point.borders_ratio), fmt::format("{:.3f}", point.insides_ratio),
+                     fmt::format("{:.2f}", 100.0 * point.insides_cut_share),
+                     fmt::format("{:.3f}", point.seen_error), fmt::format("{:.3f}", point.full_error),
+                     fmt::format("{:.2f}", point.repetition)});
+  }
+  return fmt::format("{}\n{}", chart.name, TextTable(table));
+}
+
+std::string SummaryOf(const std::vector<TilesRow>& rows) {
+  std::vector<std::vector<std::string>> table = {
+      {"MATERIAL", "TEXELS", "TILES", "METHOD", "SECONDS", "USED %", "MB", "R WITHIN"}};
+  for (const TilesRow& row : rows) {
+    const auto add = [&](std::vector<std::string> rest) {
+      const std::vector<std::string> start = {row.material, fmt::format("{0}x{0}", row.side),
+                                              fmt::format("{0}x{0}", row.tile_size)};
+      rest.insert(rest.begin(), start.begin(), start.end());
+      table.push_back(std::move(rest));
+    };
+    add({"paper", fmt::format("{:.0f}", 60.0 * row.paper_minutes),
+         fmt::format("{:.2f}", 100.0 * row.paper_share), fmt::format("{:.2f}", row.paper_megabytes), ""});
+    if (row.run) {
+      add({"frame", fmt::format("{:.1f}", row.run->seconds),
+           fmt::format("{:.2f}", 100.0 * row.run->referenced_share),
+           fmt::format("{:.2f}", 1e-6 * static_cast<double>(row.run->btfel_bytes)),
+           fmt::format("{:.3f}", row.run->insides_ratio)});
+    } else {
+      add({"frame", "not run: --paper-largest", "", "", ""});
+    }
+  }
+  return TextTable(table);
+}
+
+// A source's name as part of a file's.
+std::string FileNameOf(std::string name) {
+  std::ranges::replace_if(
+      name, [](char c) { return std::isalnum(static_cast<unsigned char>(c)) == 0 && c != '-'; }, '_');
+  return name;
+}
+
+absl::Status RunSynthesis(Session& session, const ChartFlags& flags) {
+  const bool has_paper = flags.paper || flags.paper_largest;
+  TESSERA_RETURN_IF_ERROR(Prepare(flags, "chart synthesis"));
+  const std::string html_path = PathIn(flags, "synthesis.html");
+  TESSERA_RETURN_IF_ERROR(AtomicFile::Create(html_path).status());
+
+  std::vector<SynthesisChart> charts;
+  std::vector<std::string> summaries;
+  for (const std::string& text : flags.sources) {
+    TESSERA_ASSIGN_OR_RETURN(const std::unique_ptr<BtfSource> source, OpenSource(session, text, flags));
+    TESSERA_ASSIGN_OR_RETURN(
+        SynthesisChart chart,
+        ChartSynthesis(NameOf(text, flags.sources), *source,
+                       flags.quick ? ChartSize::kQuick : ChartSize::kFull, session.Context()));
+    summaries.push_back(SummaryOf(chart));
+    charts.push_back(std::move(chart));
+  }
+  std::vector<TilesRow> paper;
+  if (has_paper) {
+    TESSERA_ASSIGN_OR_RETURN(paper, RunTilesTable(PaperSizeOf(flags), session.Context()));
+    summaries.push_back(SummaryOf(paper));
+  }
+  TESSERA_ASSIGN_OR_RETURN(const std::string html, SynthesisHtml(charts, paper));
+  std::vector<std::string> files;
+  const auto write = [&](const std::string& path, const std::string& bytes) {
+    files.push_back(path);
+    return WriteFileAtomically(path, bytes);
+  };
+  TESSERA_RETURN_IF_ERROR(write(html_path, html));
+  if (!charts.empty()) {
+    TESSERA_RETURN_IF_ERROR(write(PathIn(flags, "synthesis.csv"), SynthesisCsv(charts)));
+  }
+  for (const SynthesisChart& chart : charts) {
+    for (size_t method = 0; method < chart.sheets.size(); ++method) {
+      TESSERA_ASSIGN_OR_RETURN(const std::string png, EncodePng(chart.sheets[method]));
+      const std::string file = FileNameOf(fmt::format("{}-{}", chart.name, kChartedMethods[method].name));
+      TESSERA_RETURN_IF_ERROR(write(PathIn(flags, file + ".png"), png));
+    }
+  }
+  if (has_paper) {
+    TESSERA_RETURN_IF_ERROR(write(PathIn(flags, "tiles.csv"), TilesCsv(paper)));
+  }
+  const std::vector<StageTime> stages = session.FinishStages();
+  Json described = Json::array();
+  for (const SynthesisChart& chart : charts) {
+    described.push_back({{"name", chart.name}, {"settings", chart.points.size()}});
+  }
+  session.Answer({{"sources", described}, {"files", files}, {"stages", Session::JsonOfStages(stages)}},
+                 fmt::format("{}\n{}", fmt::join(summaries, "\n\n"), fmt::join(files, "\n")));
+  return absl::OkStatus();
+}
+
+// The options that both charts have.
+std::shared_ptr<ChartFlags> AddChart(CLI::App& command, const char* files, const char* quick,
+                                     const char* paper, const char* paper_largest) {
+  auto flags = std::make_shared<ChartFlags>();
+  command.add_option(
+      "SOURCE", flags->sources,
+      "Folder or file as for material import, generated:KIND[,key=value..] (size, seed, views, lights, "
+      "..), or a material whose recorded source is at hand");
+  command.add_option("-o,--output", flags->folder, files)->required();
+  command.add_flag("--quick", flags->quick, quick);
+  command.add_flag("--paper", flags->paper, paper);
+  command.add_flag("--paper-largest", flags->paper_largest, paper_largest);
+  command.add_option("--layout", flags->layout, "How the images of folders and files are laid out")
+      ->check(CLI::IsMember({"auto", "ubo2003", "manifest", "exr"}))
+      ->capture_default_str();
+  command.add_option("--transfer", flags->transfer,
+                     "Their transfer curve: srgb, linear or gamma:G [by file type]");
+  return flags;
+}
+
 }  // namespace
 
 void AddChartCommand(CLI::App& app, Session& session) {
   CLI::App* noun = app.add_subcommand("chart", "Methods against each other, as CSV and as a page");
   noun->require_subcommand(1);
-  const auto flags = std::make_shared<ChartFlags>();
-  CLI::App* command = noun->add_subcommand(
+  CLI::App* codecs = noun->add_subcommand(
       "codecs", "Bytes, time and error of every codec and setting, and of JPEG files; minutes a source");
-  command->add_option(
-      "SOURCE", flags->sources,
-      "Folder or file as for material import, generated:KIND[,key=value..] (size, seed, views, lights, "
-      "..), or a material whose recorded source is at hand");
-  command->add_option("-o,--output", flags->folder, "Folder for codecs.html, codecs.csv, paper.csv")
-      ->required();
-  command->add_flag("--quick", flags->quick, "Few settings, on the middle 64x64 texels: under a minute");
-  command->add_flag("--paper", flags->paper,
-                    "Table II of Leung et al. 2007, ours beside it, up to 256x256 texels");
-  command->add_flag("--paper-largest", flags->paper_largest, "The same with its 800x800 rows: minutes more");
-  command->add_option("--layout", flags->layout, "How the images of folders and files are laid out")
-      ->check(CLI::IsMember({"auto", "ubo2003", "manifest", "exr"}))
-      ->capture_default_str();
-  command->add_option("--transfer", flags->transfer,
-                      "Their transfer curve: srgb, linear or gamma:G [by file type]");
-  command->callback(
-      [&session, flags] { session.run = [&session, flags] { return RunChart(session, *flags); }; });
+  const auto codec_flags = AddChart(*codecs, "Folder for codecs.html, codecs.csv, paper.csv",
+                                    "Few settings, on the middle 64x64 texels: under a minute",
+                                    "Table II of Leung et al. 2007, ours beside it, up to 256x256 texels",
+                                    "The same with its 800x800 rows: minutes more");
+  codecs->callback([&session, codec_flags] {
+    session.run = [&session, codec_flags] { return RunCodecs(session, *codec_flags); };
+  });
+  CLI::App* synthesis = noun->add_subcommand(
+      "synthesis", "Seams, time and repetition of tiles, ours and the published baselines; minutes a source");
+  const auto synthesis_flags =
+      AddChart(*synthesis, "Folder for synthesis.html, synthesis.csv, tiles.csv and pictures of the tiles",
+               "Few settings, on the middle 64x64 texels: under a minute",
+               "Table III of Leung et al. 2007, ours beside it, from 128x128 texels",
+               "The same with its rows of 256x256 and 800x800 texels: many minutes more");
+  synthesis->callback([&session, synthesis_flags] {
+    session.run = [&session, synthesis_flags] { return RunSynthesis(session, *synthesis_flags); };
+  });
 }
 
 }  // namespace tessera::cli

@@ -151,6 +151,28 @@ class NoServerTest(harness.unittest.TestCase):
         finally:
             harness.shutil.rmtree(folder)
 
+    def test_synthesis_is_charted(self):
+        folder = harness.pathlib.Path(harness.tempfile.mkdtemp(prefix="tessera-e2e-"))
+        try:
+            source = "generated:holes,size=64,views=2x5,lights=2x5,area-samples=1,bounces=0"
+            made = self.tessera("chart", "synthesis", source, "--quick", "-o", str(folder), "--json", timeout=280,
+                                TESSERA_SERVER="127.0.0.1:1")
+            self.assertEqual(made.code, 0, made)
+            page, table = folder / "synthesis.html", folder / "synthesis.csv"
+            self.assertEqual(made.json()["files"][:2], [str(page), str(table)])
+            pictures = made.json()["files"][2:]
+            self.assertEqual(len(pictures), 4)
+            self.assertTrue(all(harness.pathlib.Path(p).read_bytes()[1:4] == b"PNG" for p in pictures))
+            with table.open(newline="") as rows:
+                rows = list(csv.DictReader(rows))
+            self.assertEqual({(row["method"], row["seam_rule"]) for row in rows},
+                             {("diamond-dp", "mismatch"), ("diamond-cut", "mismatch"), ("frame", "mismatch"),
+                              ("frame", "excess")})
+            root = xml.etree.ElementTree.fromstring(page.read_text())
+            self.assertEqual([e for e in root.iter() if e.get("href") or e.tag in ("script", "link")], [])
+        finally:
+            harness.shutil.rmtree(folder)
+
     def test_charts_say_what_is_wrong(self):
         folder = harness.pathlib.Path(harness.tempfile.mkdtemp(prefix="tessera-e2e-"))
         try:
@@ -240,6 +262,13 @@ class MainJobTest(harness.CommandTest):
         self.assertEqual(whole["images"]["count"], shown["images"]["of"])
         self.assertEqual(self.run_json("tileset", "show", "surface-96/skin")["certificate"], whole)
         self.assert_fails(5, "tileset", "synthesize", "skin", *SYNTHESIZE, "--force", reason="NAME_TAKEN")
+        self.assertEqual(self.run_json("tileset", "show", "surface-96/skin")["metadata"]["method"], "frame")
+        made = self.run_json("tileset", "synthesize", "skin", *SYNTHESIZE, "--force", "--name", "diamonds",
+                             "--method", "diamond-cut")
+        self.assertEqual(made["tile_set"]["metadata"]["method"], "diamond-cut")
+        self.assertIn("diamond-cut", self.run_ok("tileset", "show", "surface-96/diamonds").out)
+        self.run_ok("tileset", "delete", "surface-96/diamonds")
+        self.assert_fails(2, "tileset", "synthesize", "skin", *SYNTHESIZE, "--method", "hexagon", says="hexagon")
         self.run_ok("tileset", "pull", "surface-96/skin", "-o", "skin-tiles.tsra")
         self.run_ok("tileset", "sheet", "surface-96/skin", "-o", "tiles.png")
         self.assertGreater(self.picture("tiles.png")[2], 20)
