@@ -94,6 +94,16 @@ std::vector<SynthesisSetting> SettingsOf(ChartSize size, size_t method, int embe
       add(&SynthesisSetting::dims, dims);
     }
   }
+  // What diamonds score depends on a few samples; they are quick, so that seeds can be averaged.
+  for (int seed = 2; IsDiamond(method) && seed <= plan.num_seeds; ++seed) {
+    for (const int dims : plan.dims) {
+      if (dims <= embedding_dims && dims != common.dims) {
+        settings.push_back(common);
+        settings.back().dims = dims;
+        settings.back().seed = static_cast<uint64_t>(seed);
+      }
+    }
+  }
   for (const int candidates : IsDiamond(method) ? plan.draws : plan.patches) {
     add(&SynthesisSetting::candidates, candidates);
   }

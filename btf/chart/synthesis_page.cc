@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <array>
 #include <functional>
+#include <map>
 #include <optional>
 #include <string>
 #include <vector>
@@ -47,26 +48,44 @@ constexpr std::array<MethodLook, kChartedMethods.size()> kMethodLooks = {{{"#cc7
 
 using ValueOf = std::function<double(const SynthesisPoint&)>;
 
-// The points of a method that differ from its common setting in `member` alone, in order of it.
+// The points of a method that differ from its common setting in `member` and seed alone, in order of it: the
+// mean over seeds of each.
 template <typename Value>
-std::vector<const SynthesisPoint*> Varied(const SynthesisChart& chart, size_t method,
-                                          Value SynthesisSetting::*member) {
-  std::vector<const SynthesisPoint*> varied;
+std::vector<SynthesisPoint> Varied(const SynthesisChart& chart, size_t method,
+                                   Value SynthesisSetting::*member) {
+  constexpr std::array kFigures = {&SynthesisPoint::seconds,       &SynthesisPoint::borders_ratio,
+                                   &SynthesisPoint::insides_ratio, &SynthesisPoint::seen_error,
+                                   &SynthesisPoint::full_error,    &SynthesisPoint::repetition};
+  std::map<Value, std::vector<const SynthesisPoint*>> by_value;
   for (const SynthesisPoint& point : chart.points) {
-    SynthesisSetting setting = point.setting;
-    setting.*member = chart.common(method).*member;
-    if (point.method == method && setting == chart.common(method)) {
-      varied.push_back(&point);
+    SynthesisSetting common = chart.common(method);
+    common.seed = point.setting.seed;
+    common.*member = point.setting.*member;
+    if (point.method == method && point.setting == common) {
+      by_value[point.setting.*member].push_back(&point);
     }
   }
-  std::ranges::sort(varied, {}, [&](const SynthesisPoint* p) { return p->setting.*member; });
+  std::vector<SynthesisPoint> varied;
+  for (const auto& [value, points] : by_value) {
+    SynthesisPoint& mean = varied.emplace_back(*points.front());
+    for (const auto figure : kFigures) {
+      mean.*figure = 0.0;
+      for (const SynthesisPoint* const point : points) {
+        mean.*figure += point->*figure / static_cast<double>(points.size());
+      }
+    }
+  }
   return varied;
 }
+
+// Whether the points of a method are joined in a plot.
+enum class Joined { kYes, kNo };
 
 struct Axes {
   std::string title;
   PlotAxis x;
   PlotAxis y;
+  Joined joined = Joined::kYes;
 };
 
 template <typename Value>
@@ -76,8 +95,12 @@ std::string PlotOf(const SynthesisChart& chart, const Axes& axes, Value Synthesi
   for (size_t method = 0; method < kChartedMethods.size(); ++method) {
     const MethodLook& look = kMethodLooks[method];
     PlotSeries series{kChartedMethods[method].name, look.colour, look.marker, {}};
-    for (const SynthesisPoint* const point : Varied(chart, method, member)) {
-      series.points.push_back({x_of(*point), y_of(*point), ""});
+    for (const SynthesisPoint& point : Varied(chart, method, member)) {
+      series.points.push_back({x_of(point), y_of(point), ""});
+      if (axes.joined == Joined::kNo) {
+        plot.series.push_back(series);
+        series.points.clear();
+      }
     }
     plot.series.push_back(std::move(series));
   }
@@ -135,8 +158,10 @@ std::string SynthesisPlots(const SynthesisChart& chart) {
   const std::string full_axis = absl::StrCat("mismatch of seams in all ", chart.embedding_dims, " layers");
   return absl::StrCat(
       row("Seams against time, one point a seed or number of candidates",
-          {PlotOf(chart, {"Within tiles, seeds", seconds, insides}, &S::seed, seconds_of, Insides),
-           PlotOf(chart, {"Across borders, seeds", seconds, borders}, &S::seed, seconds_of, Borders),
+          {PlotOf(chart, {"Within tiles, seeds", seconds, insides, Joined::kNo}, &S::seed, seconds_of,
+                  Insides),
+           PlotOf(chart, {"Across borders, seeds", seconds, borders, Joined::kNo}, &S::seed, seconds_of,
+                  Borders),
            PlotOf(chart, {"Within tiles, candidates", seconds, insides}, &S::candidates, seconds_of,
                   Insides)}),
       row("Seam error against the number of coefficient layers; 1: a join of texels drawn at random",
@@ -204,27 +229,19 @@ std::string SynthesisFindings(const SynthesisChart& chart) {
   std::string html = "<ul>\n";
   for (size_t method = 0; method < kChartedMethods.size(); ++method) {
     const auto layers = Varied(chart, method, &SynthesisSetting::dims);
-    const auto seeds = Varied(chart, method, &SynthesisSetting::seed);
-    if (layers.empty() || seeds.empty()) {
+    const auto common = std::ranges::find(layers, chart.common(method), &SynthesisPoint::setting);
+    if (common == layers.end()) {
       continue;
-    }
-    double insides = 0.0;
-    double borders = 0.0;
-    double seconds = 0.0;
-    for (const SynthesisPoint* const point : seeds) {
-      insides += point->insides_ratio / static_cast<double>(seeds.size());
-      borders += point->borders_ratio / static_cast<double>(seeds.size());
-      seconds += point->seconds / static_cast<double>(seeds.size());
     }
     absl::StrAppendFormat(
         &html,
-        "<li><b>%s</b>: R %.3f within tiles, %.3f across borders, %.2f s (mean of %d seeds). From %d to %d "
+        "<li><b>%s</b>: R %.3f within tiles, %.3f across borders, %.2f s (means of seeds). From %d to %d "
         "layers the mismatch of its seams in those layers goes from %.3f to %.3f, in all layers from %.3f to "
         "%.3f, R within tiles from %.3f to %.3f.</li>\n",
-        kChartedMethods[method].name, insides, borders, seconds, seeds.size(), layers.front()->setting.dims,
-        layers.back()->setting.dims, layers.front()->seen_error, layers.back()->seen_error,
-        layers.front()->full_error, layers.back()->full_error, layers.front()->insides_ratio,
-        layers.back()->insides_ratio);
+        kChartedMethods[method].name, common->insides_ratio, common->borders_ratio, common->seconds,
+        layers.front().setting.dims, layers.back().setting.dims, layers.front().seen_error,
+        layers.back().seen_error, layers.front().full_error, layers.back().full_error,
+        layers.front().insides_ratio, layers.back().insides_ratio);
   }
   return html + "</ul>\n";
 }
@@ -304,7 +321,8 @@ diamonds are pieces of the exemplar, so that only their ends can have seams.</li
 <li><b>Mismatch of seams</b>: half the sum of |a - b'| and |a' - b| within tiles, over the root mean square distance of two texels
 drawn at random, in the same dimensions. Layers are the principal components of the SH coefficients, the largest first.</li>
 <li><b>Time</b>: wall clock from the embedding to the tiles, spectra of the exemplar included, the certificate not.</li>
-<li>One parameter varies, the others stay: 32 layers, 256 draws at most or 8 patches, seed 1.</li>
+<li>One parameter varies, the others stay: 32 layers, 256 draws at most or 8 patches. Points are means over the seeds that the
+table has for them: up to three for the common setting and for the layers of diamonds, which depend on a few samples.</li>
 </ul>
 )";
 

@@ -74,7 +74,8 @@ class Scale {
       const double raw = (high_ - low_) / 5.0;
       const double power = std::pow(10.0, std::floor(std::log10(raw)));
       const double step = raw / power < 1.5 ? power : raw / power < 3.5 ? 2.0 * power : 5.0 * power;
-      for (double value = std::ceil(low_ / step) * step; value <= high_; value += step) {
+      // The sum makes 0 of -0.
+      for (double value = std::ceil(low_ / step) * step + 0.0; value <= high_; value += step) {
         ticks.push_back({value, true});
       }
     }
