@@ -131,8 +131,8 @@ std::string SynthesisPlots(const SynthesisChart& chart) {
   const auto linear = [](const std::string& label, std::optional<double> from) {
     return PlotAxis{.label = label, .scale = AxisScale::kLinear, .from = from};
   };
-  const PlotAxis insides = linear("R within tiles", 1.0);
-  const PlotAxis borders = linear("R across borders", 1.0);
+  const PlotAxis insides = linear("R within tiles", 0.9);
+  const PlotAxis borders = linear("R across borders (diamonds: ends of sides alone)", 0.9);
   const PlotAxis seconds{.label = "seconds, without the certificate"};
   PlotAxis dims{.label = "coefficient layers: dimensions that cuts see"};
   dims.ticks = TicksOf(chart, Dims);
