@@ -42,7 +42,7 @@ constexpr int kFewestPatches = 24;
 constexpr int kPatience = 4;           // times as many while a threshold is missed
 constexpr int kFruitlessPatches = 24;  // improvements in a row that fail before a good canvas is left alone
 
-enum SeedStage : uint64_t { kLaySeed = 1, kImproveSeed = 2 };
+enum FillSeed : uint64_t { kLaySeed = 1, kImproveSeed = 2 };
 
 int LargestWindow(const Exemplar& exemplar, int feature_size) {
   const int shorter = std::min(exemplar.width(), exemplar.height());
