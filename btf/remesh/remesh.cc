@@ -296,8 +296,7 @@ std::vector<std::string> RemeshReport::Warnings() const {
   if (worst_distance > kMaxSurfaceDistance) {
     warnings.push_back(
         absl::StrFormat("the quads miss the surface by up to %.3g of the diagonal of its box, the limit is "
-                        "%g; more quads keep "
-                        "thinner parts",
+                        "%g; more quads keep thinner parts",
                         worst_distance, kMaxSurfaceDistance));
   }
   return warnings;

@@ -8,12 +8,12 @@
 //   int64_t value = cut.Solve();
 //   bool source_side = cut.OnSourceSide(x, y);
 //
-//        s . . t         With both terminals on the outer face, a cut is a path of faces from the gap behind
-//        the s . . t         source to the gap behind the sink, seen clockwise (here from above to below),
-//        and an edge s . . t         costs what it carries from the path's right hand, the source's side, to
-//        its left. The
-//                        minimum cut is a shortest such path [Itai1979]; its value is GridCut's on the same
-//                        graph.
+// clang-format off
+//     s . . t    With both terminals on the outer face, a cut is a path of faces from the gap behind the source
+//     s . . t    to the gap behind the sink, seen clockwise (here from above to below), and an edge costs what
+//     s . . t    it carries from the path's right hand, the source's side, to its left. The minimum cut is a
+//                shortest such path [Itai1979]; its value is GridCut's on the same graph.
+// clang-format on
 //
 // Faces wait in buckets by distance, several distances in one, and are seen again when one of their own
 // bucket improves them: exact, and integers throughout. Among cuts of one value the choice is arbitrary, but

@@ -1,6 +1,7 @@
 // The baselines: tiles of four diamonds, cut along the tile's diagonals [Cohen2003], [PCAWang] 4.3, by
 // dynamic programming or by a minimum cut.
 //
+// clang-format off
 //       +-----------+     Every edge colour has one sample of the exemplar, a square of w x w texels whose
 //       |\  north  /|     middle line is the edge; a tile shows one half of it. At each corner the samples of
 //       | \   .   / |     two sides overlap near the diagonal, in |i - j| < h / 2 of the square of corners.h,
@@ -9,10 +10,10 @@
 //       |west \ east|
 //       |   /   \   |     [PCAWang] 4.1 draws patches at random until the error of every overlap is below
 //       |  /     \  |     d_max, and cuts after that. Our copy lacks its equations 3 and 4, so we read: d is
-//       | /   .   \ |     the mean squared distance over an overlap's texels, summed over all layers, and of
-//       a
+//       | /   .   \ |     the mean squared distance over an overlap's texels, summed over all layers, and of a
 //       |/  south  \|     set of samples, one for every colour, the largest over all pairs that can meet.
 //       +-----------+     d_max has its own unit here, see DiamondParams.
+// clang-format on
 //
 // Tiles agree across a common side for the same reason as ours: both show the two middle rows of one sample.
 // The rows at the border are therefore pinned as in corners.h.

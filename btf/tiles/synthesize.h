@@ -65,8 +65,8 @@ struct SynthesisParams {
 // MATERIAL_TOO_SMALL when the exemplar is the cause) or an unknown codec; FAILED_PRECONDITION with reason
 // NOT_ISOTROPIC (turned strips only, unless forced) or THRESHOLD_NOT_REACHED (unless forced), each with its
 // figures; CANCELLED within one patch search. Progress: stages "corners", "strips", "tiles" and
-// "certificate"; "samples" of diamonds, whose thresholds
-// are told but not enforced.
+// "certificate"; of diamonds, whose thresholds are told but not enforced, "samples", "tiles" and
+// "certificate".
 [[nodiscard]] absl::StatusOr<TileSet> SynthesizeTileSet(const Material& material,
                                                         const Arrangement& arrangement,
                                                         const SynthesisParams& params,

@@ -53,8 +53,7 @@ Json JsonOf(const RemeshReport& report) {
 std::string TextOf(const RemeshReport& report) {
   return fmt::format(
       "{} quads, genus {} (input {}), angles off 90 degrees by {:.1f} (worst {:.1f}), area ratio {:.2f} "
-      "(worst "
-      "{:.2f}), {} flipped, off the surface by {:.2g} of its box (worst {:.2g})",
+      "(worst {:.2f}), {} flipped, off the surface by {:.2g} of its box (worst {:.2g})",
       report.num_quads, report.topology_out.genus, report.topology_in.genus, report.mean_angle_deviation_deg,
       report.worst_angle_deviation_deg, report.mean_area_ratio, report.worst_area_ratio, report.num_flipped,
       report.mean_distance, report.worst_distance);
@@ -250,8 +249,7 @@ void AddMeshCommands(CLI::App& app, Session& session) {
 
   constexpr char kMeshHelp[] =
       "OBJ or OFF file of quads, a closed mesh of triangles (OBJ, OFF, PLY, GLB, glTF), which is remeshed, "
-      "or "
-      "builtin:plane, torus, cube-sphere, genus3";
+      "or builtin:plane, torus, cube-sphere, genus3";
   const auto dress_flags = std::make_shared<DressFlags>();
   CLI::App* dress =
       noun->add_subcommand("dress", "Give each quad a tile of an arrangement; done here, once per mesh");
