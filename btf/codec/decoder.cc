@@ -170,7 +170,7 @@ void Unrolled(const Body& body) {
   (std::make_index_sequence<kCount>());
 }
 
-// `kTexels` BTFels, k codes apart, at least kLanes codes each.
+// `kTexels` BTFels, k codes apart; kLanes codes of each must be there.
 template <size_t kTexels>
 [[gnu::flatten, gnu::noinline]] void DecodeTogether(const CodeForm& form, const uint8_t* codes, size_t k,
                                                     float* rgb) {
@@ -242,16 +242,11 @@ void Decoder::DecodeTexels(std::span<const uint8_t> codes, const Eigen::Vector3d
   const LinearForm form = Form(UnturnedFromTurned(light, turns), UnturnedFromTurned(view, turns));
   const CodeForm on_codes = MakeCodeForm(form, offset_, step_);
   const size_t num_texels = codes.size() / k;
-  if (k < kLanes) {
-    for (size_t texel = 0; texel < num_texels; ++texel) {
-      std::array<uint8_t, kLanes> padded{};
-      std::ranges::copy(codes.subspan(texel * k, k), padded.begin());
-      DecodeTogether<1>(on_codes, padded.data(), k, rgb.data() + 3 * texel);
-    }
-    return;
-  }
+  // A smaller BTFel is read with the first codes of the next, which weigh nothing.
+  const size_t num_readable =
+      k >= kLanes ? num_texels : codes.size() < kLanes ? 0 : (codes.size() - kLanes) / k + 1;
   size_t texel = 0;
-  for (; texel + kTexelsTogether <= num_texels; texel += kTexelsTogether) {
+  for (; texel + kTexelsTogether <= num_readable; texel += kTexelsTogether) {
     if (texel + kTexelsTogether + kPrefetchedTexels <= num_texels) {
       for (size_t t = 0; t < kTexelsTogether; ++t) {
         const uint8_t* const ahead = codes.data() + (texel + t + kPrefetchedTexels) * k;
@@ -262,8 +257,13 @@ void Decoder::DecodeTexels(std::span<const uint8_t> codes, const Eigen::Vector3d
     }
     DecodeTogether<kTexelsTogether>(on_codes, codes.data() + texel * k, k, rgb.data() + 3 * texel);
   }
-  for (; texel < num_texels; ++texel) {
+  for (; texel < num_readable; ++texel) {
     DecodeTogether<1>(on_codes, codes.data() + texel * k, k, rgb.data() + 3 * texel);
+  }
+  for (; texel < num_texels; ++texel) {
+    std::array<uint8_t, kLanes> padded{};
+    std::ranges::copy(codes.subspan(texel * k, k), padded.begin());
+    DecodeTogether<1>(on_codes, padded.data(), k, rgb.data() + 3 * texel);
   }
 }
 
