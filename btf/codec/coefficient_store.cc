@@ -1,28 +1,13 @@
 #include "btf/codec/coefficient_store.h"
 
 #include <algorithm>
-#include <cstdlib>
 #include <mutex>
 #include <utility>
 
-#include "btf/base/huge_pages.h"
 #include "btf/base/parallel.h"
 #include "btf/base/status_macros.h"
 
 namespace tessera {
-namespace {
-
-std::unique_ptr<float[], FreeDeleter> Allocate(uint64_t count) {
-  const size_t bytes = (count * sizeof(float) + kHugePageBytes - 1) / kHugePageBytes * kHugePageBytes;
-  void* const memory = std::aligned_alloc(kHugePageBytes, bytes);
-  if (memory != nullptr) {
-    AdviseHugePages(memory, bytes);
-  }
-  return std::unique_ptr<float[], FreeDeleter>(static_cast<float*>(memory));
-}
-
-}  // namespace
-
 absl::StatusOr<std::unique_ptr<CoefficientStore>> CoefficientStore::Create(
     uint64_t num_values, uint64_t budget_bytes, const std::filesystem::path& spill_folder) {
   std::unique_ptr<CoefficientStore> store(new CoefficientStore());
@@ -37,7 +22,7 @@ absl::StatusOr<std::unique_ptr<CoefficientStore>> CoefficientStore::Create(
 
 std::span<float> CoefficientStore::Buffer::Resize(uint64_t count) {
   if (count > size) {
-    values = Allocate(count);
+    values = AllocateHuge<float>(count);
     size = count;
   }
   return {values.get(), count};

@@ -8,7 +8,6 @@
 #pragma once
 
 #include <cstdint>
-#include <cstdlib>
 #include <filesystem>
 #include <future>
 #include <memory>
@@ -19,16 +18,13 @@
 #include <absl/status/status.h>
 #include <absl/status/statusor.h>
 
+#include "btf/base/huge_pages.h"
 #include "btf/base/run_context.h"
 #include "btf/base/spill_file.h"
 #include "btf/codec/code_buffer.h"
 #include "btf/codec/quantize.h"
 
 namespace tessera {
-
-struct FreeDeleter {
-  void operator()(float* memory) const { std::free(memory); }
-};
 
 // Not thread-safe; the span of a block may be filled by many threads.
 class CoefficientStore {
@@ -59,7 +55,7 @@ class CoefficientStore {
   CoefficientStore() = default;
 
   struct Buffer {
-    std::unique_ptr<float[], FreeDeleter> values;
+    HugeBuffer<float> values;
     uint64_t size = 0;
 
     // Not zeroed: the threads that fill it also fault its pages in.

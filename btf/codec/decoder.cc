@@ -244,7 +244,7 @@ void Decoder::DecodeTexels(std::span<const uint8_t> codes, const Eigen::Vector3d
   const size_t num_texels = codes.size() / k;
   // A smaller BTFel is read with the first codes of the next, which weigh nothing.
   const size_t num_readable =
-      k >= kLanes ? num_texels : codes.size() < kLanes ? 0 : (codes.size() - kLanes) / k + 1;
+      codes.size() < kLanes ? 0 : std::min(num_texels, (codes.size() - kLanes) / k + 1);
   size_t texel = 0;
   for (; texel + kTexelsTogether <= num_readable; texel += kTexelsTogether) {
     if (texel + kTexelsTogether + kPrefetchedTexels <= num_texels) {

@@ -19,8 +19,7 @@ RowPasses::RowPasses(BtfSource& source, uint64_t block_bytes, int expected_passe
       std::min(block_bytes, kMaxRowBlockBytes) / row_bytes, 1, static_cast<uint64_t>(source.info().height)));
   // One stage for the caller: the source's own rows are not told apart from their encoding.
   source_context_.progress = nullptr;
-  // Not zeroed, the source fills it.
-  buffer_ = std::make_unique_for_overwrite<float[]>(source.SamplesPerRow() * rows_per_block_);
+  buffer_ = AllocateHuge<float>(source.SamplesPerRow() * rows_per_block_);
 }
 
 absl::Status RowPasses::Run(const std::function<absl::Status(const SampleBlock&)>& visit) {

@@ -14,6 +14,7 @@
 
 #include <absl/status/status.h>
 
+#include "btf/base/huge_pages.h"
 #include "btf/base/run_context.h"
 #include "btf/data/btf_source.h"
 
@@ -48,7 +49,7 @@ class RowPasses {
   int rows_per_block_ = 1;
   int expected_;
   int done_ = 0;
-  std::unique_ptr<float[]> buffer_;
+  HugeBuffer<float> buffer_;
 };
 
 }  // namespace tessera

@@ -16,6 +16,10 @@ constexpr double kNullEigenvalue = 1e-14;
 
 }  // namespace
 
+SignalEnergies EnergiesOf(const Eigen::MatrixXf& signals, const Eigen::MatrixXf& projected) {
+  return {projected.cast<double>().rowwise().squaredNorm(), signals.cast<double>().squaredNorm()};
+}
+
 RidgeRegression::RidgeRegression(const Eigen::MatrixXd& basis, const Eigen::MatrixXd& penalty) {
   assert(basis.allFinite() && basis.size() > 0 && penalty.rows() == basis.cols());
   // Not by Cholesky: a penalty may be too badly conditioned for it.
@@ -31,9 +35,10 @@ RidgeRegression::RidgeRegression(const Eigen::MatrixXd& basis, const Eigen::Matr
   eigenvalues_ = projection_.rowwise().squaredNorm();
 }
 
-SignalEnergies RidgeRegression::Energies(const Eigen::Ref<const Eigen::MatrixXd>& signals) const {
+Eigen::MatrixXf RidgeRegression::Project(const Eigen::MatrixXf& signals) const {
   assert(signals.rows() == projection_.cols());
-  return {(projection_ * signals).rowwise().squaredNorm(), signals.squaredNorm()};
+  // Single precision costs each p_i a rounding of its own row's size only, however small its eigenvalue.
+  return projection_.cast<float>() * signals;
 }
 
 double RidgeRegression::ChooseRidge(const SignalEnergies& signals, double max_ridge) const {
@@ -70,10 +75,10 @@ double RidgeRegression::ChooseRidge(const SignalEnergies& signals, double max_ri
   return found == scores.end() ? ridges.front() : ridges[static_cast<size_t>(found - scores.begin())];
 }
 
-Eigen::MatrixXd RidgeRegression::Fit(double ridge) const {
+Eigen::MatrixXd RidgeRegression::FitOfProjected(double ridge) const {
   const Eigen::VectorXd gains =
       (eigenvalues_.array() + ridge > 0.0).select((eigenvalues_.array() + ridge).inverse(), 0.0).matrix();
-  return back_ * gains.asDiagonal() * projection_;
+  return back_ * gains.asDiagonal();
 }
 
 Eigen::MatrixXd LeastSquaresFit(const Eigen::MatrixXd& basis, double relative_floor) {

@@ -10,7 +10,8 @@
 // takes sums over the signals of p_i^2 and |f|^2 only.
 //
 //   RidgeRegression regression(basis);
-//   const double ridge = regression.ChooseRidge(regression.Energies(signals), 10.0);   // a sample is enough
+//   const Eigen::MatrixXf projected = regression.Project(signals);   // a sample is enough
+//   const double ridge = regression.ChooseRidge(EnergiesOf(signals, projected), 10.0);
 //   coefficients = regression.Fit(ridge) * all_signals;
 #pragma once
 
@@ -23,6 +24,9 @@ struct SignalEnergies {
   Eigen::VectorXd projected;  // [n], sums of p_i^2
   double total = 0.0;         // sum of |f|^2
 };
+
+// Of signals [M][any number] and what RidgeRegression::Project made of them.
+[[nodiscard]] SignalEnergies EnergiesOf(const Eigen::MatrixXf& signals, const Eigen::MatrixXf& projected);
 
 // Immutable after construction, safe to share between threads.
 class RidgeRegression {
@@ -41,14 +45,17 @@ class RidgeRegression {
   explicit RidgeRegression(const Eigen::MatrixXd& basis)
       : RidgeRegression(basis, Eigen::MatrixXd::Identity(basis.cols(), basis.cols())) {}
 
-  // Of finite signals [M][any number].
-  [[nodiscard]] SignalEnergies Energies(const Eigen::Ref<const Eigen::MatrixXd>& signals) const;
+  // p of finite signals [M][any number], [n][as many].
+  [[nodiscard]] Eigen::MatrixXf Project(const Eigen::MatrixXf& signals) const;
 
   // One of the ridges above up to max_ridge (> kMinRidge, relative as well), absolute. 0 when the basis is 0.
   [[nodiscard]] double ChooseRidge(const SignalEnergies& signals, double max_ridge) const;
 
   // [n][M]; ridge > 0, or 0 for a basis of 0 (then 0).
-  [[nodiscard]] Eigen::MatrixXd Fit(double ridge) const;
+  [[nodiscard]] Eigen::MatrixXd Fit(double ridge) const { return FitOfProjected(ridge) * projection_; }
+
+  // [n][n], from p to coefficients; ridges as above.
+  [[nodiscard]] Eigen::MatrixXd FitOfProjected(double ridge) const;
 
  private:
   Eigen::MatrixXd back_;         // W Q

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <atomic>
 #include <cmath>
-#include <functional>
 #include <limits>
 #include <memory>
 #include <mutex>
@@ -15,6 +14,7 @@
 #include <Eigen/Core>
 #include <nlohmann/json.hpp>
 
+#include "btf/base/huge_pages.h"
 #include "btf/base/parallel.h"
 #include "btf/base/status_macros.h"
 #include "btf/codec/coefficient_store.h"
@@ -30,6 +30,7 @@ namespace tessera {
 namespace {
 
 constexpr int64_t kSamplesPerTask = 1 << 18;
+constexpr int64_t kRidgeTexelsPerTask = 4;
 // More rows at once gain nothing.
 constexpr uint64_t kMaxRowBlockBytes = uint64_t{64} << 20;
 
@@ -165,8 +166,7 @@ absl::StatusOr<Material> EncodeWith(const Model& model, BtfSource& source, const
 
   Ranges ranges(k);
   ScratchPool pool;
-  // Not zeroed, the source fills it.
-  auto sample_buffer = std::make_unique_for_overwrite<float[]>(source.SamplesPerRow() * rows_per_block);
+  HugeBuffer<float> sample_buffer = AllocateHuge<float>(source.SamplesPerRow() * rows_per_block);
   for (int row = 0; row < info.height; row += rows_per_block) {
     context.Report("encode", row, info.height, "rows");
     TESSERA_RETURN_IF_ERROR(context.CheckStop());
@@ -208,55 +208,46 @@ absl::StatusOr<Material> EncodeWith(const Model& model, BtfSource& source, const
 
 // The texels that ridges are chosen by, spread evenly over up to kRidgeRows rows, up to kRidgeTexels of each.
 struct RidgeTexels {
-  int64_t count = 0;
-  Eigen::Index num_lights = 0;
-  Eigen::Index num_signals = 0;      // of one texel: (channel, view)
-  std::unique_ptr<float[]> samples;  // [texel][channel][view][light]
-
-  // As signals over the lights, [lights][(channel, view)].
-  [[nodiscard]] Eigen::MatrixXd LightSignals(int64_t texel) const {
-    return Eigen::Map<const Eigen::MatrixXf>(samples.get() + texel * num_lights * num_signals, num_lights,
-                                             num_signals)
-        .cast<double>();
-  }
+  std::vector<Eigen::MatrixXf> projected;  // of one texel's signals over the lights, [kl][(channel, view)]
+  std::vector<SignalEnergies> energies;
 };
 
-absl::StatusOr<RidgeTexels> ReadRidgeTexels(BtfSource& source, const RunContext& context) {
+absl::StatusOr<RidgeTexels> ProjectRidgeTexels(const RidgeRegression& light, BtfSource& source,
+                                               const RunContext& context) {
   constexpr int kRidgeRows = 8;
   constexpr int kRidgeTexels = 32;
-  constexpr size_t kMaxRidgeSamples = size_t{64} << 18;  // 64 MiB
   const BtfInfo& info = source.info();
   const int num_rows = std::min(kRidgeRows, info.height);
+  const int texels_per_row = std::min(kRidgeTexels, info.width);
   const auto spread = [](int64_t i, int64_t count, int64_t extent) {
     return (2 * i + 1) * extent / (2 * count);
   };
   RunContext source_context = context;
   source_context.progress = nullptr;
-  RidgeTexels texels{.num_lights = static_cast<Eigen::Index>(info.lights.size()),
-                     .num_signals = static_cast<Eigen::Index>(3 * info.views.size())};
-  const size_t samples_per_texel = static_cast<size_t>(texels.num_lights * texels.num_signals);
-  const size_t affordable = std::max<size_t>(1, kMaxRidgeSamples / (samples_per_texel * num_rows));
-  const int texels_per_row =
-      static_cast<int>(std::min<size_t>(affordable, std::min(kRidgeTexels, info.width)));
-  texels.count = int64_t{num_rows} * texels_per_row;
-  // Not zeroed, they are filled.
-  texels.samples = std::make_unique_for_overwrite<float[]>(samples_per_texel * texels.count);
-  const auto row_buffer = std::make_unique_for_overwrite<float[]>(source.SamplesPerRow());
+  const auto num_lights = static_cast<Eigen::Index>(info.lights.size());
+  const auto num_signals = static_cast<Eigen::Index>(3 * info.views.size());
+  RidgeTexels texels;
+  texels.projected.resize(static_cast<size_t>(num_rows) * texels_per_row);
+  texels.energies.resize(texels.projected.size());
+  const HugeBuffer<float> row_buffer = AllocateHuge<float>(source.SamplesPerRow());
   const std::span<float> row(row_buffer.get(), source.SamplesPerRow());
   for (int y = 0; y < num_rows; ++y) {
     TESSERA_RETURN_IF_ERROR(context.CheckStop());
     const int source_row = static_cast<int>(spread(y, num_rows, info.height));
     TESSERA_RETURN_IF_ERROR(source.ReadRows(source_row, 1, row, source_context));
     std::atomic<bool> is_legal = true;
-    ParallelFor(context, 0, texels_per_row, /*grain=*/4, [&](int64_t begin, int64_t end) {
+    ParallelFor(context, 0, texels_per_row, kRidgeTexelsPerTask, [&](int64_t begin, int64_t end) {
       for (int64_t x = begin; x < end; ++x) {
-        const std::span<const float> texel =
-            row.subspan(spread(x, texels_per_row, info.width) * samples_per_texel, samples_per_texel);
-        if (!std::ranges::all_of(texel, IsLegalSample)) {
+        const float* const samples =
+            row.data() + spread(x, texels_per_row, info.width) * num_lights * num_signals;
+        if (!std::all_of(samples, samples + num_lights * num_signals, IsLegalSample)) {
           is_legal = false;
+          return;
         }
-        std::ranges::copy(texel,
-                          texels.samples.get() + (int64_t{y} * texels_per_row + x) * samples_per_texel);
+        const Eigen::MatrixXf signals = Eigen::Map<const Eigen::MatrixXf>(samples, num_lights, num_signals);
+        const size_t texel = static_cast<size_t>(int64_t{y} * texels_per_row + x);
+        texels.projected[texel] = light.Project(signals);
+        texels.energies[texel] = EnergiesOf(signals, texels.projected[texel]);
       }
     });
     if (!is_legal) {
@@ -267,18 +258,9 @@ absl::StatusOr<RidgeTexels> ReadRidgeTexels(BtfSource& source, const RunContext&
   return texels;
 }
 
-// The sum over all texels of `signals_of(texel)`, in their order.
-absl::StatusOr<SignalEnergies> SumEnergies(const RidgeRegression& regression, int64_t num_texels,
-                                           const std::function<Eigen::MatrixXd(int64_t texel)>& signals_of,
-                                           const RunContext& context) {
-  std::vector<SignalEnergies> energies(static_cast<size_t>(num_texels));
-  ParallelFor(context, 0, num_texels, /*grain=*/8, [&](int64_t begin, int64_t end) {
-    for (int64_t texel = begin; texel < end; ++texel) {
-      energies[static_cast<size_t>(texel)] = regression.Energies(signals_of(texel));
-    }
-  });
-  TESSERA_RETURN_IF_ERROR(context.CheckStop());
-  SignalEnergies sum = std::move(energies.front());
+// In their order.
+SignalEnergies Sum(const std::vector<SignalEnergies>& energies) {
+  SignalEnergies sum = energies.front();
   for (size_t texel = 1; texel < energies.size(); ++texel) {
     sum.projected += energies[texel].projected;
     sum.total += energies[texel].total;
@@ -287,10 +269,10 @@ absl::StatusOr<SignalEnergies> SumEnergies(const RidgeRegression& regression, in
 }
 
 // Light coefficients of one texel, [kl][(channel, view)], as signals over the views, [views][(channel, i)].
-Eigen::MatrixXd ViewSignals(const Eigen::MatrixXd& light_coefficients) {
+Eigen::MatrixXf ViewSignals(const Eigen::MatrixXf& light_coefficients) {
   const Eigen::Index kl = light_coefficients.rows();
   const Eigen::Index num_views = light_coefficients.cols() / 3;
-  Eigen::MatrixXd signals(num_views, 3 * kl);
+  Eigen::MatrixXf signals(num_views, 3 * kl);
   for (Eigen::Index channel = 0; channel < 3; ++channel) {
     signals.middleCols(channel * kl, kl) =
         light_coefficients.middleCols(channel * num_views, num_views).transpose();
@@ -305,20 +287,19 @@ struct Ridges {
 
 absl::StatusOr<Ridges> ChooseRidges(const RidgeRegression& light, const RidgeRegression& view,
                                     BtfSource& source, const RunContext& context) {
-  TESSERA_ASSIGN_OR_RETURN(const RidgeTexels texels, ReadRidgeTexels(source, context));
-  TESSERA_ASSIGN_OR_RETURN(
-      const SignalEnergies light_energies,
-      SumEnergies(
-          light, texels.count, [&](int64_t texel) { return texels.LightSignals(texel); }, context));
+  TESSERA_ASSIGN_OR_RETURN(RidgeTexels texels, ProjectRidgeTexels(light, source, context));
   Ridges ridges;
-  ridges.light = light.ChooseRidge(light_energies, kDshMaxRidge);
-  const Eigen::MatrixXd light_fit = light.Fit(ridges.light);
-  TESSERA_ASSIGN_OR_RETURN(
-      const SignalEnergies view_energies,
-      SumEnergies(
-          view, texels.count,
-          [&](int64_t texel) { return ViewSignals(light_fit * texels.LightSignals(texel)); }, context));
-  ridges.view = view.ChooseRidge(view_energies, kDshMaxRidge);
+  ridges.light = light.ChooseRidge(Sum(texels.energies), kDshMaxRidge);
+  const Eigen::MatrixXf light_fit = light.FitOfProjected(ridges.light).cast<float>();
+  ParallelFor(context, 0, static_cast<int64_t>(texels.projected.size()), kRidgeTexelsPerTask,
+              [&](int64_t begin, int64_t end) {
+                for (auto texel = static_cast<size_t>(begin); texel < static_cast<size_t>(end); ++texel) {
+                  const Eigen::MatrixXf signals = ViewSignals(light_fit * texels.projected[texel]);
+                  texels.energies[texel] = EnergiesOf(signals, view.Project(signals));
+                }
+              });
+  TESSERA_RETURN_IF_ERROR(context.CheckStop());
+  ridges.view = view.ChooseRidge(Sum(texels.energies), kDshMaxRidge);
   return ridges;
 }
 

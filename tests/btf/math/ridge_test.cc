@@ -50,7 +50,8 @@ TEST(RidgeRegressionTest, WeighsThePenalty) {
 }
 
 double ChooseRidge(const RidgeRegression& regression, const Eigen::MatrixXd& signals, double max_ridge) {
-  return regression.ChooseRidge(regression.Energies(signals), max_ridge);
+  const Eigen::MatrixXf samples = signals.cast<float>();
+  return regression.ChooseRidge(EnergiesOf(samples, regression.Project(samples)), max_ridge);
 }
 
 // The definition, with the hat matrix written out, over the same ridges.
