@@ -233,24 +233,41 @@ std::vector<Candidate> CandidateSearch::Search(const SearchQuery& query, const s
     for (int v = 0; v < num_v; ++v) {
       Transform(spectra_->plans_->inverse, turned_plane_.data() + v, line_.data(), stride);
       for (int u = 0; u < num_u; ++u) {
-        const Patch patch{turn, u, v};
         const double squares = std::max(0.0, wanted_square + line_[u].real() * scale);
-        const double use = usage == nullptr ? 0.0 : usage->RelativeUse(patch, query.width, query.height);
-        offsets_.push_back({patch, squares / norm * (1.0 + repetition * use)});
+        offsets_.push_back({Patch{turn, u, v}, squares / norm});
       }
     }
   }
 
   // A generous prefix in order of cost, thinned so that no two are near each other.
+  const size_t prefix =
+      std::min(offsets_.size(), static_cast<size_t>(count) * (2 * separation + 1) * (2 * separation + 1));
   const auto before = [](const Candidate& a, const Candidate& b) {
     return a.cost != b.cost ? a.cost < b.cost
                             : std::tuple(a.patch.turn, a.patch.v, a.patch.u) <
                                   std::tuple(b.patch.turn, b.patch.v, b.patch.u);
   };
-  const size_t prefix =
-      std::min(offsets_.size(), static_cast<size_t>(count) * (2 * separation + 1) * (2 * separation + 1));
-  std::partial_sort(offsets_.begin(), offsets_.begin() + static_cast<std::ptrdiff_t>(prefix), offsets_.end(),
-                    before);
+  const auto add_repetition = [&](Candidate& offset) {
+    offset.cost *= 1.0 + repetition * usage->RelativeUse(offset.patch, query.width, query.height);
+  };
+  size_t num_ordered = offsets_.size();
+  if (usage != nullptr && prefix < offsets_.size()) {
+    // Repetition only adds: no offset is among the best that costs more without it than so many do with it.
+    const auto end = offsets_.begin() + static_cast<std::ptrdiff_t>(prefix);
+    std::nth_element(offsets_.begin(), end, offsets_.end(), before);
+    std::for_each(offsets_.begin(), end, add_repetition);
+    const double bound = std::max_element(offsets_.begin(), end, before)->cost;
+    const auto dear =
+        std::partition(end, offsets_.end(), [&](const Candidate& offset) { return offset.cost <= bound; });
+    std::for_each(end, dear, add_repetition);
+    num_ordered = static_cast<size_t>(dear - offsets_.begin());
+  } else if (usage != nullptr) {
+    std::for_each(offsets_.begin(), offsets_.end(), add_repetition);
+  }
+  const auto ordered_end = offsets_.begin() + static_cast<std::ptrdiff_t>(num_ordered);
+  const auto prefix_end = offsets_.begin() + static_cast<std::ptrdiff_t>(prefix);
+  std::nth_element(offsets_.begin(), prefix_end, ordered_end, before);
+  std::sort(offsets_.begin(), prefix_end, before);
   std::vector<Candidate> best;
   for (size_t i = 0; i < prefix && static_cast<int>(best.size()) < count; ++i) {
     const Patch& patch = offsets_[i].patch;
