@@ -18,6 +18,23 @@ using Complex = std::complex<float>;
 // Elements beyond a line, so that the columns of a power of two do not fall into one cache set.
 constexpr int kLinePadding = 8;
 
+// Regions, in texels: windows of three features leave a quarter of four to move in, and an exemplar of the
+// usual size is one. A very large exemplar has larger ones, lest their spectra outgrow it.
+constexpr int kSmallestRegion = 128;
+constexpr int kRegionFeatures = 4;
+constexpr int kMaxRegionsAcross = 4;
+
+// First texels of regions of `side` texels that cover `extent`, evenly spaced.
+std::vector<int> RegionStarts(int extent, int side) {
+  const int stride = std::max(1, side * 3 / 4);
+  const int count = (extent - side + stride - 1) / stride + 1;
+  std::vector<int> starts;
+  for (int i = 0; i < count; ++i) {
+    starts.push_back(count == 1 ? 0 : i * (extent - side) / (count - 1));
+  }
+  return starts;
+}
+
 // kiss_fft_cpx and std::complex<float> are both two floats.
 static_assert(sizeof(kiss_fft_cpx) == sizeof(Complex));
 
@@ -70,37 +87,64 @@ struct ExemplarSpectra::Plans {
   }
 };
 
-ExemplarSpectra::ExemplarSpectra(const Exemplar& exemplar, const std::vector<int>& turns,
+int RegionSide(const Exemplar& exemplar, int feature_size) {
+  const int longer = std::max(exemplar.width(), exemplar.height());
+  return std::max({kSmallestRegion, kRegionFeatures * feature_size, longer / kMaxRegionsAcross});
+}
+
+ExemplarSpectra::ExemplarSpectra(const Exemplar& exemplar, const std::vector<int>& turns, int region_side,
                                  const RunContext& context)
     : exemplar_(&exemplar),
-      size_(kiss_fft_next_fast_size(std::max(exemplar.width(), exemplar.height()))),
+      region_width_(std::min(exemplar.width(), region_side)),
+      region_height_(std::min(exemplar.height(), region_side)),
+      size_(kiss_fft_next_fast_size(std::max(region_width_, region_height_))),
       channels_((exemplar.search_dims() + 2) / 2),
       plans_(std::make_unique<Plans>(size_)),
       spectra_(4) {
+  for (const int y : RegionStarts(exemplar.height(), region_height_)) {
+    for (const int x : RegionStarts(exemplar.width(), region_width_)) {
+      regions_.push_back({x, y});
+    }
+  }
   const size_t plane_size = static_cast<size_t>(size_) * (size_ + kLinePadding);
   for (const int turn : turns) {
-    spectra_[turn].resize(plane_size * channels_);
+    spectra_[turn].resize(plane_size * channels_ * regions_.size());
   }
   const auto num_turns = static_cast<int64_t>(turns.size());
-  ParallelFor(context, 0, num_turns * channels_, 1, [&](int64_t begin, int64_t) {
-    const int turn = turns[begin / channels_];
+  const int64_t per_turn = int64_t{num_regions()} * channels_;
+  ParallelFor(context, 0, num_turns * per_turn, 1, [&](int64_t begin, int64_t) {
+    const int turn = turns[begin / per_turn];
+    const auto region = static_cast<int>(begin % per_turn / channels_);
     const int channel = static_cast<int>(begin % channels_);
     std::vector<Complex> plane(plane_size);
     std::vector<Complex> line(size_);
     std::vector<Complex> out(plane_size);
-    for (int v = 0; v < exemplar.TurnedHeight(turn); ++v) {
-      for (int u = 0; u < exemplar.TurnedWidth(turn); ++u) {
-        const uint32_t texel = exemplar.TexelAt(turn, u, v);
+    const auto [first_u, first_v] = TurnedRegionOrigin(turn, region);
+    for (int v = 0; v < TurnedRegionHeight(turn); ++v) {
+      for (int u = 0; u < TurnedRegionWidth(turn); ++u) {
+        const uint32_t texel = exemplar.TexelAt(turn, first_u + u, first_v + v);
         plane[static_cast<size_t>(v) * (size_ + kLinePadding) + u] = {
             ChannelValue(exemplar, texel, 2 * channel), ChannelValue(exemplar, texel, 2 * channel + 1)};
       }
     }
-    Forward2d(plans_->forward, size_, exemplar.TurnedHeight(turn), plane, line, out);
-    std::copy(out.begin(), out.end(), spectra_[turn].begin() + channel * plane_size);
+    Forward2d(plans_->forward, size_, TurnedRegionHeight(turn), plane, line, out);
+    std::copy(out.begin(), out.end(), spectra_[turn].begin() + begin % per_turn * plane_size);
   });
 }
 
 ExemplarSpectra::~ExemplarSpectra() = default;
+
+int ExemplarSpectra::DrawRegion(Rng& rng) const {
+  return num_regions() == 1 ? 0 : static_cast<int>(rng.NextBelow(regions_.size()));
+}
+
+std::array<int, 2> ExemplarSpectra::TurnedRegionOrigin(int turn, int region) const {
+  const auto [x, y] = regions_[region];
+  const int right = exemplar_->width() - x - region_width_;
+  const int below = exemplar_->height() - y - region_height_;
+  const std::array<std::array<int, 2>, 4> of_turn = {{{x, y}, {y, right}, {right, below}, {below, x}}};
+  return of_turn[turn];
+}
 
 UsageMap::UsageMap(int width, int height)
     : width_(width),
@@ -157,9 +201,10 @@ CandidateSearch::CandidateSearch(const ExemplarSpectra& spectra)
 
 CandidateSearch::~CandidateSearch() = default;
 
-std::vector<Candidate> CandidateSearch::Search(const SearchQuery& query, const std::vector<int>& turns,
-                                               const UsageMap* usage, double repetition, int count,
-                                               int separation, const std::stop_token& stop) {
+std::vector<Candidate> CandidateSearch::Search(const SearchQuery& query, int region,
+                                               const std::vector<int>& turns, const UsageMap* usage,
+                                               double repetition, int count, int separation,
+                                               const std::stop_token& stop) {
   const Exemplar& exemplar = spectra_->exemplar();
   const int size = spectra_->size_;
   const int stride = size + kLinePadding;
@@ -204,8 +249,8 @@ std::vector<Candidate> CandidateSearch::Search(const SearchQuery& query, const s
   offsets_.clear();
   const double scale = 1.0 / (static_cast<double>(size) * size);
   for (const int turn : turns) {
-    const int num_u = exemplar.TurnedWidth(turn) - query.width + 1;
-    const int num_v = exemplar.TurnedHeight(turn) - query.height + 1;
+    const int num_u = spectra_->TurnedRegionWidth(turn) - query.width + 1;
+    const int num_v = spectra_->TurnedRegionHeight(turn) - query.height + 1;
     if (num_u <= 0 || num_v <= 0) {
       continue;
     }
@@ -215,8 +260,9 @@ std::vector<Candidate> CandidateSearch::Search(const SearchQuery& query, const s
     std::fill(sum_.begin(), sum_.end(), Complex{});
     for (int channel = 0; channel < spectra_->channels_; ++channel) {
       const float* q = reinterpret_cast<const float*>(query_spectra_[channel].data());
-      const float* e =
-          reinterpret_cast<const float*>(spectra_->spectra_[turn].data() + channel * plane_.size());
+      const float* e = reinterpret_cast<const float*>(
+          spectra_->spectra_[turn].data() +
+          (static_cast<size_t>(region) * spectra_->channels_ + channel) * plane_.size());
       float* s = reinterpret_cast<float*>(sum_.data());
       const size_t length = 2 * plane_.size();
       for (size_t i = 0; i < length; i += 2) {
@@ -230,11 +276,12 @@ std::vector<Candidate> CandidateSearch::Search(const SearchQuery& query, const s
       Transform(spectra_->plans_->inverse, sum_.data() + static_cast<size_t>(x) * stride, line_.data(), 1);
       std::copy_n(line_.data(), size, turned_plane_.data() + static_cast<size_t>(x) * stride);
     }
+    const auto [first_u, first_v] = spectra_->TurnedRegionOrigin(turn, region);
     for (int v = 0; v < num_v; ++v) {
       Transform(spectra_->plans_->inverse, turned_plane_.data() + v, line_.data(), stride);
       for (int u = 0; u < num_u; ++u) {
         const double squares = std::max(0.0, wanted_square + line_[u].real() * scale);
-        offsets_.push_back({Patch{turn, u, v}, squares / norm});
+        offsets_.push_back({Patch{turn, first_u + u, first_v + v}, squares / norm});
       }
     }
   }

@@ -1,11 +1,14 @@
 // Where in the exemplar a window of the canvas finds patches like itself: all offsets of all turns at once,
-// by FFT cross-correlation over the embedding, then a choice among the best.
+// by FFT cross-correlation over the embedding, then a choice among the best. Of a large exemplar each search
+// sees one region, so that its price is the windows' affair and not the exemplar's.
 //
 // With weights w and wanted points c, the cost of an offset is sum w |c - e|^2 = sum w |c|^2 - 2 sum (w c) e
 // + sum w |e|^2: one correlation a dimension and one with |e|^2. Channels are correlated in pairs: the real
 // part of corr(q1 + i q2, e1 + i e2) is corr(q1, e1) + corr(q2, e2).
 #pragma once
 
+#include <algorithm>
+#include <array>
 #include <complex>
 #include <cstdint>
 #include <memory>
@@ -19,24 +22,48 @@
 
 namespace tessera {
 
-// Transforms of the exemplar in its turns, and the plans; shared by all threads.
+// Side of the regions for windows of up to three features, in texels.
+[[nodiscard]] int RegionSide(const Exemplar& exemplar, int feature_size);
+
+// Transforms of the exemplar in its turns, by regions, and the plans; shared by all threads.
 class ExemplarSpectra {
  public:
-  ExemplarSpectra(const Exemplar& exemplar, const std::vector<int>& turns, const RunContext& context);
+  // Regions are at most `region_side` wide and high, of one size, and overlap by a quarter or more.
+  ExemplarSpectra(const Exemplar& exemplar, const std::vector<int>& turns, int region_side,
+                  const RunContext& context);
   ~ExemplarSpectra();
   ExemplarSpectra(const ExemplarSpectra&) = delete;
   ExemplarSpectra& operator=(const ExemplarSpectra&) = delete;
 
   [[nodiscard]] const Exemplar& exemplar() const { return *exemplar_; }
+  [[nodiscard]] int num_regions() const { return static_cast<int>(regions_.size()); }
+  // The shorter side of a region.
+  [[nodiscard]] int shorter_side() const { return std::min(region_width_, region_height_); }
+  // A region, drawn uniformly; where there is one only, nothing is drawn.
+  [[nodiscard]] int DrawRegion(Rng& rng) const;
 
  private:
   friend class CandidateSearch;
   struct Plans;
+
+  [[nodiscard]] int TurnedRegionWidth(int turn) const {
+    return (turn & 1) == 0 ? region_width_ : region_height_;
+  }
+  [[nodiscard]] int TurnedRegionHeight(int turn) const {
+    return (turn & 1) == 0 ? region_height_ : region_width_;
+  }
+  // The region's first column and row in the turned exemplar.
+  [[nodiscard]] std::array<int, 2> TurnedRegionOrigin(int turn, int region) const;
+
   const Exemplar* exemplar_;
-  int size_ = 0;      // of the square transform
-  int channels_ = 0;  // complex ones
+  int region_width_ = 0;
+  int region_height_ = 0;
+  std::vector<std::array<int, 2>> regions_;  // first column and row, unturned
+  int size_ = 0;                             // of the square transform
+  int channels_ = 0;                         // complex ones
   std::unique_ptr<Plans> plans_;
-  std::vector<std::vector<std::complex<float>>> spectra_;  // [turn], empty for a turn not asked for
+  // [turn], empty for a turn not asked for; then [region][channel].
+  std::vector<std::vector<std::complex<float>>> spectra_;
 };
 
 // How often each exemplar pixel has been used, whatever the turn. Sums over rectangles in constant time.
@@ -77,10 +104,10 @@ class CandidateSearch {
   explicit CandidateSearch(const ExemplarSpectra& spectra);
   ~CandidateSearch();
 
-  // At most `count` candidates among `turns`, best first, no two within `separation` texels of each other in
-  // both axes of the same turn. `usage` may be null; a patch used twice as often as the mean costs
-  // `repetition` more. Empty when the window fits no turn or after a stop request.
-  std::vector<Candidate> Search(const SearchQuery& query, const std::vector<int>& turns,
+  // At most `count` candidates in the region among `turns`, best first, no two within `separation` texels of
+  // each other in both axes of the same turn. `usage` may be null; a patch used twice as often as the mean
+  // costs `repetition` more. Empty when the window fits no turn or after a stop request.
+  std::vector<Candidate> Search(const SearchQuery& query, int region, const std::vector<int>& turns,
                                 const UsageMap* usage, double repetition, int count, int separation,
                                 const std::stop_token& stop);
 

@@ -139,7 +139,8 @@ class CornerSearch {
  public:
   CornerSearch(const ExemplarSpectra& spectra, const Arrangement& arrangement, int strip_height,
                uint64_t seed)
-      : exemplar_(spectra.exemplar()),
+      : spectra_(spectra),
+        exemplar_(spectra.exemplar()),
         strip_height_(strip_height),
         pairs_(CornerPairs(arrangement)),
         search_(spectra),
@@ -159,8 +160,8 @@ class CornerSearch {
 
   void Improve(int sample, bool greedy, const std::stop_token& stop) {
     MakeQuery(sample);
-    const std::vector<Candidate> candidates =
-        search_.Search(query_, turns_[sample], nullptr, 0.0, kCornerCandidates, 1, stop);
+    const std::vector<Candidate> candidates = search_.Search(
+        query_, spectra_.DrawRegion(rng_), turns_[sample], nullptr, 0.0, kCornerCandidates, 1, stop);
     const Patch before = samples_[sample];
     std::vector<Patch> patches = {before};
     std::vector<double> costs = {CostAround(sample)};
@@ -338,6 +339,7 @@ class CornerSearch {
     return costs.size() - 1;
   }
 
+  const ExemplarSpectra& spectra_;
   const Exemplar& exemplar_;
   int strip_height_;
   std::vector<CornerPair> pairs_;

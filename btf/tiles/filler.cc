@@ -12,7 +12,7 @@
 namespace tessera {
 namespace {
 
-// A patch leaves the search at least a quarter of the exemplar's shorter side to move in.
+// A patch leaves the search at least a quarter of a region's shorter side to move in.
 constexpr double kLargestWindowShare = 0.75;
 // First windows, in halves of a feature: small enough that one patch can meet all that is known around it.
 constexpr int kFirstFeatures = 5;
@@ -44,8 +44,8 @@ constexpr int kFruitlessPatches = 24;  // improvements in a row that fail before
 
 enum FillSeed : uint64_t { kLaySeed = 1, kImproveSeed = 2 };
 
-int LargestWindow(const Exemplar& exemplar, int feature_size) {
-  const int shorter = std::min(exemplar.width(), exemplar.height());
+int LargestWindow(const ExemplarSpectra& spectra, int feature_size) {
+  const int shorter = spectra.shorter_side();
   return std::min(shorter, std::max(feature_size, static_cast<int>(kLargestWindowShare * shorter)));
 }
 
@@ -133,14 +133,14 @@ void MakeQuery(const Canvas& canvas, const Window& window, SearchQuery& query) {
 
 // Searches patches for the window, cuts some of the best and keeps the cheapest, one that repeats a sibling
 // only when the window must be filled and all of them do. Returns how many texels it changed.
-int MatchWindow(const FillParams& params, const Window& window, const Matching& matching,
-                const std::stop_token& stop, Rng& rng, FillerScratch& scratch, Canvas& canvas,
-                FillReport& report) {
+int MatchWindow(const ExemplarSpectra& spectra, const FillParams& params, const Window& window,
+                const Matching& matching, const std::stop_token& stop, Rng& rng, FillerScratch& scratch,
+                Canvas& canvas, FillReport& report) {
   MakeQuery(canvas, window, scratch.query);
   const int separation = std::max(1, matching.separation * params.feature_size / 8);
   std::vector<Candidate> candidates =
-      scratch.search.Search(scratch.query, params.turns, params.usage, matching.repetition,
-                            kKeptPerCut * params.num_candidates, separation, stop);
+      scratch.search.Search(scratch.query, spectra.DrawRegion(rng), params.turns, params.usage,
+                            matching.repetition, kKeptPerCut * params.num_candidates, separation, stop);
   const int trials = (matching.trials * params.num_candidates + 7) / 8;
   candidates = SampleCandidates(std::move(candidates), trials, matching.temperature, rng);
   std::optional<Patch> best_patch;
@@ -199,11 +199,12 @@ void Filler::Lay(const Window& window, const Patch& patch, Canvas& canvas, FillR
 absl::Status Filler::LayEmpty(const FillParams& params, const RunContext& context, Canvas& canvas,
                               FillReport& report) {
   Rng rng(Mix64(params.seed, kLaySeed));
-  const int largest = LargestWindow(canvas.exemplar(), params.feature_size);
+  const int largest = LargestWindow(*spectra_, params.feature_size);
   while (canvas.num_unfilled() > 0) {
     const int first = std::min(largest, kFirstFeatures * params.feature_size / 2);
     const Window window = FirstWindow(canvas, first, params.feature_size);
-    const int changed = MatchWindow(params, window, kFirst, context.stop, rng, scratch_, canvas, report);
+    const int changed =
+        MatchWindow(*spectra_, params, window, kFirst, context.stop, rng, scratch_, canvas, report);
     TESSERA_RETURN_IF_ERROR(context.CheckStop());
     if (changed == 0) {
       return absl::InternalError("no patch covers the empty part of a canvas");
@@ -215,7 +216,7 @@ absl::Status Filler::LayEmpty(const FillParams& params, const RunContext& contex
 absl::Status Filler::Improve(const FillParams& params, const RunContext& context, Canvas& canvas,
                              FillReport& report) {
   Rng rng(Mix64(params.seed, kImproveSeed));
-  const int largest = LargestWindow(canvas.exemplar(), params.feature_size);
+  const int largest = LargestWindow(*spectra_, params.feature_size);
   int num_free = 0;
   for (int y = 0; y < canvas.height(); ++y) {
     for (int x = 0; x < canvas.width(); ++x) {
@@ -240,7 +241,8 @@ absl::Status Filler::Improve(const FillParams& params, const RunContext& context
                   std::min({wanted, largest, canvas.height()})};
     window.x = std::clamp((*focus)[0] - window.width / 2, 0, canvas.width() - window.width);
     window.y = std::clamp((*focus)[1] - window.height / 2, 0, canvas.height() - window.height);
-    const int changed = MatchWindow(params, window, kImprove, context.stop, rng, scratch_, canvas, report);
+    const int changed =
+        MatchWindow(*spectra_, params, window, kImprove, context.stop, rng, scratch_, canvas, report);
     fruitless = changed > 0 ? 0 : fruitless + 1;
     TESSERA_RETURN_IF_ERROR(context.CheckStop());
   }

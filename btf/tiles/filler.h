@@ -51,7 +51,8 @@ struct FillerScratch {
 // One per thread; keeps scratch memory.
 class Filler {
  public:
-  explicit Filler(const ExemplarSpectra& spectra) : scratch_{CandidateSearch(spectra), {}, {}} {}
+  explicit Filler(const ExemplarSpectra& spectra)
+      : spectra_(&spectra), scratch_{CandidateSearch(spectra), {}, {}} {}
 
   // Lays one patch given by the caller: its free texels in `window` are filled or improved.
   void Lay(const Window& window, const Patch& patch, Canvas& canvas, FillReport& report);
@@ -67,6 +68,7 @@ class Filler {
   absl::Status Fill(const FillParams& params, const RunContext& context, Canvas& canvas, FillReport& report);
 
  private:
+  const ExemplarSpectra* spectra_;
   FillerScratch scratch_;
 };
 

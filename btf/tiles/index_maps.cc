@@ -88,7 +88,7 @@ absl::StatusOr<IndexMaps> SynthesizeIndexMaps(const Exemplar& exemplar, const Ar
       }
     }
   }
-  const ExemplarSpectra spectra(exemplar, turns, context);
+  const ExemplarSpectra spectra(exemplar, turns, RegionSide(exemplar, params.strip_height), context);
   TESSERA_RETURN_IF_ERROR(context.CheckStop());
 
   context.Report("corners", 0, 1, "sets");

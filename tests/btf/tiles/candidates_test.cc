@@ -1,6 +1,7 @@
 #include "btf/tiles/candidates.h"
 
 #include <algorithm>
+#include <utility>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -38,35 +39,56 @@ double BruteForce(const Exemplar& exemplar, const SearchQuery& query, const Patc
   return cost / weights / exemplar.search_spread();
 }
 
+// In one region, and in two that have a window's width in common.
 TEST(CandidateSearchTest, FindsTheBestOffsetsOfAllTurns) {
   const Exemplar exemplar(BumpyEmbedding(21, 14, 8));
   const std::vector<int> turns = {0, 1, 2, 3};
-  const ExemplarSpectra spectra(exemplar, turns, RunContext{});
-  CandidateSearch search(spectra);
-  Rng rng(4);
-  for (int round = 0; round < 20; ++round) {
-    const SearchQuery query = RandomQuery(exemplar, rng);
-    double best = 1e9;
-    for (const int turn : turns) {
-      for (int v = 0; v + 4 <= exemplar.TurnedHeight(turn); ++v) {
-        for (int u = 0; u + 5 <= exemplar.TurnedWidth(turn); ++u) {
-          best = std::min(best, BruteForce(exemplar, query, {turn, u, v}));
+  for (const auto& [side, num_regions] : {std::pair(21, 1), std::pair(14, 2)}) {
+    const ExemplarSpectra spectra(exemplar, turns, side, RunContext{});
+    ASSERT_EQ(spectra.num_regions(), num_regions);
+    EXPECT_EQ(spectra.shorter_side(), 14);
+    CandidateSearch search(spectra);
+    Rng rng(4);
+    for (int round = 0; round < 20; ++round) {
+      const SearchQuery query = RandomQuery(exemplar, rng);
+      double best = 1e9;
+      for (const int turn : turns) {
+        for (int v = 0; v + 4 <= exemplar.TurnedHeight(turn); ++v) {
+          for (int u = 0; u + 5 <= exemplar.TurnedWidth(turn); ++u) {
+            best = std::min(best, BruteForce(exemplar, query, {turn, u, v}));
+          }
         }
       }
-    }
-    const std::vector<Candidate> found = search.Search(query, turns, nullptr, 0.0, 6, 1, {});
-    ASSERT_EQ(found.size(), 6u);
-    EXPECT_NEAR(found.front().cost, best, kTransformTolerance);
-    for (size_t i = 0; i < found.size(); ++i) {
-      EXPECT_NEAR(found[i].cost, BruteForce(exemplar, query, found[i].patch), kTransformTolerance);
-      for (size_t j = 0; j < i; ++j) {
-        EXPECT_LE(found[j].cost, found[i].cost);
-        EXPECT_TRUE(found[i].patch.turn != found[j].patch.turn ||
-                    std::abs(found[i].patch.u - found[j].patch.u) > 1 ||
-                    std::abs(found[i].patch.v - found[j].patch.v) > 1);
+      double best_found = 1e9;
+      for (int region = 0; region < num_regions; ++region) {
+        const std::vector<Candidate> found = search.Search(query, region, turns, nullptr, 0.0, 6, 1, {});
+        ASSERT_EQ(found.size(), 6u);
+        best_found = std::min(best_found, found.front().cost);
+        for (size_t i = 0; i < found.size(); ++i) {
+          EXPECT_NEAR(found[i].cost, BruteForce(exemplar, query, found[i].patch), kTransformTolerance);
+          for (size_t j = 0; j < i; ++j) {
+            EXPECT_LE(found[j].cost, found[i].cost);
+            EXPECT_TRUE(found[i].patch.turn != found[j].patch.turn ||
+                        std::abs(found[i].patch.u - found[j].patch.u) > 1 ||
+                        std::abs(found[i].patch.v - found[j].patch.v) > 1);
+          }
+        }
       }
+      EXPECT_NEAR(best_found, best, kTransformTolerance);
     }
   }
+}
+
+TEST(ExemplarSpectraTest, RegionsAreDrawnFromAll) {
+  const Exemplar exemplar(BumpyEmbedding(40, 21, 8));
+  const ExemplarSpectra spectra(exemplar, {0}, 16, RunContext{});
+  ASSERT_EQ(spectra.num_regions(), 6);
+  Rng rng(1);
+  std::vector<int> draws(6, 0);
+  for (int draw = 0; draw < 60; ++draw) {
+    ++draws[spectra.DrawRegion(rng)];
+  }
+  EXPECT_GT(*std::ranges::min_element(draws), 0);
 }
 
 TEST(UsageMapTest, CountsTheRectangleOfATurnedPatch) {

@@ -15,7 +15,7 @@ namespace {
 constexpr int kStripHeight = 8;
 
 Corners Choose(const Exemplar& exemplar, const char* arrangement, int strip_height, uint64_t seed) {
-  const ExemplarSpectra spectra(exemplar, {0, 1, 2, 3}, RunContext{});
+  const ExemplarSpectra spectra(exemplar, {0, 1, 2, 3}, RegionSide(exemplar, 8), RunContext{});
   absl::StatusOr<Corners> corners =
       ChooseCorners(spectra, **FindArrangement(arrangement), strip_height, seed, RunContext{});
   EXPECT_TRUE(corners.ok()) << corners.status();
