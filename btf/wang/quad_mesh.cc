@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <numeric>
 
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_format.h>
@@ -90,15 +91,28 @@ std::string EdgeName(std::span<const Eigen::Vector3f> positions, uint32_t vertex
 }
 
 std::vector<HalfEdge> SortedHalfEdges(const QuadMesh& mesh) {
-  std::vector<HalfEdge> half_edges;
-  half_edges.reserve(mesh.quads.size() * 4);
-  for (uint32_t face = 0; face < mesh.quads.size(); ++face) {
-    for (uint32_t side = 0; side < 4; ++side) {
-      const auto [low, high] = std::minmax(mesh.quads[face][side], mesh.quads[face][(side + 1) & 3]);
-      half_edges.push_back({low, high, 4 * face + side});
+  const auto edge_of = [&](uint32_t face, uint32_t side) {
+    const auto [low, high] = std::minmax(mesh.quads[face][side], mesh.quads[face][(side + 1) & 3]);
+    return HalfEdge{low, high, 4 * face + side};
+  };
+  const auto visit = [&](const auto& visitor) {
+    for (uint32_t face = 0; face < mesh.quads.size(); ++face) {
+      for (uint32_t side = 0; side < 4; ++side) {
+        visitor(edge_of(face, side));
+      }
     }
+  };
+  // By the lower vertex through counts, then the few edges of each: several times faster than one sort.
+  std::vector<uint32_t> ends(mesh.positions.size() + 1, 0);
+  visit([&](const HalfEdge& edge) { ++ends[edge.low + 1]; });
+  std::partial_sum(ends.begin(), ends.end(), ends.begin());
+  std::vector<HalfEdge> half_edges(mesh.quads.size() * 4);
+  visit([&](const HalfEdge& edge) { half_edges[ends[edge.low]++] = edge; });
+  uint32_t begin = 0;
+  for (size_t vertex = 0; vertex < mesh.positions.size(); ++vertex) {
+    std::sort(half_edges.begin() + begin, half_edges.begin() + ends[vertex]);
+    begin = ends[vertex];
   }
-  std::sort(half_edges.begin(), half_edges.end());
   return half_edges;
 }
 
