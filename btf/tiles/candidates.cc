@@ -6,17 +6,11 @@
 #include <cstdlib>
 #include <tuple>
 
-#include <kiss_fft.h>
-
 #include "btf/base/parallel.h"
+#include "btf/tiles/fourier_transform.h"
 
 namespace tessera {
 namespace {
-
-using Complex = std::complex<float>;
-
-// Elements beyond a line, so that the columns of a power of two do not fall into one cache set.
-constexpr int kLinePadding = 8;
 
 // Regions, in texels: windows of three features leave a quarter of four to move in, and an exemplar of the
 // usual size is one. A very large exemplar has larger ones, lest their spectra outgrow it.
@@ -35,23 +29,12 @@ std::vector<int> RegionStarts(int extent, int side) {
   return starts;
 }
 
-// kiss_fft_cpx and std::complex<float> are both two floats.
-static_assert(sizeof(kiss_fft_cpx) == sizeof(Complex));
-
-void Transform(kiss_fft_cfg plan, const Complex* in, Complex* out, int in_stride) {
-  kiss_fft_stride(plan, reinterpret_cast<const kiss_fft_cpx*>(in), reinterpret_cast<kiss_fft_cpx*>(out),
-                  in_stride);
-}
-
-// The value of search channel `channel` (dimensions, then the squared length, then 0) of a texel.
+// The value of search channel `channel` (dimensions, then the squared length) of a texel.
 float ChannelValue(const Exemplar& exemplar, uint32_t texel, int channel) {
   const float* const point = exemplar.Point(texel);
   const int dims = exemplar.search_dims();
   if (channel < dims) {
     return point[channel];
-  }
-  if (channel > dims) {
-    return 0.0f;
   }
   float square = 0.0f;
   for (int dim = 0; dim < dims; ++dim) {
@@ -60,32 +43,24 @@ float ChannelValue(const Exemplar& exemplar, uint32_t texel, int channel) {
   return square;
 }
 
-// Two-dimensional transform of the first `rows` rows of `plane` (the others are 0), left transposed in `out`.
-void Forward2d(kiss_fft_cfg plan, int size, int rows, std::vector<Complex>& plane, std::vector<Complex>& line,
-               std::vector<Complex>& out) {
-  const int stride = size + kLinePadding;
-  for (int y = 0; y < rows; ++y) {
-    Transform(plan, plane.data() + static_cast<size_t>(y) * stride, line.data(), 1);
-    std::copy_n(line.data(), size, plane.data() + static_cast<size_t>(y) * stride);
-  }
-  for (int x = 0; x < size; ++x) {
-    Transform(plan, plane.data() + x, out.data() + static_cast<size_t>(x) * stride, stride);
+// Adds the product of the conjugate of `query` with `exemplar`, channel by channel.
+void AddCorrelation(const Eigen::MatrixXf& query, const Eigen::MatrixXf& exemplar, int channels,
+                    Eigen::MatrixXf& sum) {
+  const Eigen::Index size = sum.rows() / 2;
+  const Eigen::Index columns = sum.cols();
+  for (Eigen::Index k = 0; k < columns; ++k) {
+    auto real = sum.col(k).head(size).array();
+    auto imaginary = sum.col(k).tail(size).array();
+    for (int channel = 0; channel < channels; ++channel) {
+      const auto q = query.col(channel * columns + k).array();
+      const auto e = exemplar.col(channel * columns + k).array();
+      real += q.head(size) * e.head(size) + q.tail(size) * e.tail(size);
+      imaginary += q.head(size) * e.tail(size) - q.tail(size) * e.head(size);
+    }
   }
 }
 
 }  // namespace
-
-struct ExemplarSpectra::Plans {
-  kiss_fft_cfg forward = nullptr;
-  kiss_fft_cfg inverse = nullptr;
-  explicit Plans(int size)
-      : forward(kiss_fft_alloc(size, 0, nullptr, nullptr)),
-        inverse(kiss_fft_alloc(size, 1, nullptr, nullptr)) {}
-  ~Plans() {
-    kiss_fft_free(forward);
-    kiss_fft_free(inverse);
-  }
-};
 
 int RegionSide(const Exemplar& exemplar, int feature_size) {
   const int longer = std::max(exemplar.width(), exemplar.height());
@@ -97,38 +72,33 @@ ExemplarSpectra::ExemplarSpectra(const Exemplar& exemplar, const std::vector<int
     : exemplar_(&exemplar),
       region_width_(std::min(exemplar.width(), region_side)),
       region_height_(std::min(exemplar.height(), region_side)),
-      size_(kiss_fft_next_fast_size(std::max(region_width_, region_height_))),
-      channels_((exemplar.search_dims() + 2) / 2),
-      plans_(std::make_unique<Plans>(size_)),
+      channels_(exemplar.search_dims() + 1),
+      transform_(std::make_unique<FourierTransform>(std::max(region_width_, region_height_))),
       spectra_(4) {
   for (const int y : RegionStarts(exemplar.height(), region_height_)) {
     for (const int x : RegionStarts(exemplar.width(), region_width_)) {
       regions_.push_back({x, y});
     }
   }
-  const size_t plane_size = static_cast<size_t>(size_) * (size_ + kLinePadding);
   for (const int turn : turns) {
-    spectra_[turn].resize(plane_size * channels_ * regions_.size());
+    spectra_[turn].resize(regions_.size());
   }
   const auto num_turns = static_cast<int64_t>(turns.size());
-  const int64_t per_turn = int64_t{num_regions()} * channels_;
-  ParallelFor(context, 0, num_turns * per_turn, 1, [&](int64_t begin, int64_t) {
-    const int turn = turns[begin / per_turn];
-    const auto region = static_cast<int>(begin % per_turn / channels_);
-    const int channel = static_cast<int>(begin % channels_);
-    std::vector<Complex> plane(plane_size);
-    std::vector<Complex> line(size_);
-    std::vector<Complex> out(plane_size);
+  ParallelFor(context, 0, num_turns * num_regions(), 1, [&](int64_t begin, int64_t) {
+    const int turn = turns[begin / num_regions()];
+    const auto region = static_cast<int>(begin % num_regions());
     const auto [first_u, first_v] = TurnedRegionOrigin(turn, region);
-    for (int v = 0; v < TurnedRegionHeight(turn); ++v) {
-      for (int u = 0; u < TurnedRegionWidth(turn); ++u) {
-        const uint32_t texel = exemplar.TexelAt(turn, first_u + u, first_v + v);
-        plane[static_cast<size_t>(v) * (size_ + kLinePadding) + u] = {
-            ChannelValue(exemplar, texel, 2 * channel), ChannelValue(exemplar, texel, 2 * channel + 1)};
+    Eigen::MatrixXf plane(TurnedRegionHeight(turn), TurnedRegionWidth(turn));
+    Eigen::MatrixXf lines(2 * plane.rows(), channels_ * transform_->columns());
+    for (int channel = 0; channel < channels_; ++channel) {
+      for (int u = 0; u < plane.cols(); ++u) {
+        for (int v = 0; v < plane.rows(); ++v) {
+          plane(v, u) = ChannelValue(exemplar, exemplar.TexelAt(turn, first_u + u, first_v + v), channel);
+        }
       }
+      transform_->Across(plane, channel, lines);
     }
-    Forward2d(plans_->forward, size_, TurnedRegionHeight(turn), plane, line, out);
-    std::copy(out.begin(), out.end(), spectra_[turn].begin() + begin % per_turn * plane_size);
+    transform_->Down(lines, spectra_[turn][region]);
   });
 }
 
@@ -191,13 +161,7 @@ double UsageMap::RelativeUse(const Patch& patch, int width, int height) const {
   return static_cast<double>(uses) / (static_cast<double>(width) * height) / mean;
 }
 
-CandidateSearch::CandidateSearch(const ExemplarSpectra& spectra)
-    : spectra_(&spectra),
-      plane_(static_cast<size_t>(spectra.size_) * (spectra.size_ + kLinePadding)),
-      turned_plane_(plane_.size()),
-      sum_(plane_.size()),
-      query_spectra_(spectra.channels_, std::vector<Complex>(plane_.size())),
-      line_(spectra.size_) {}
+CandidateSearch::CandidateSearch(const ExemplarSpectra& spectra) : spectra_(&spectra) {}
 
 CandidateSearch::~CandidateSearch() = default;
 
@@ -206,8 +170,7 @@ std::vector<Candidate> CandidateSearch::Search(const SearchQuery& query, int reg
                                                double repetition, int count, int separation,
                                                const std::stop_token& stop) {
   const Exemplar& exemplar = spectra_->exemplar();
-  const int size = spectra_->size_;
-  const int stride = size + kLinePadding;
+  const FourierTransform& transform = *spectra_->transform_;
   const int dims = exemplar.search_dims();
   const int num_texels = query.width * query.height;
 
@@ -225,29 +188,24 @@ std::vector<Candidate> CandidateSearch::Search(const SearchQuery& query, int reg
 
   const double norm = exemplar.search_spread() * (weight_sum > 0.0 ? weight_sum : 1.0);
 
-  const auto query_value = [&](int i, int channel) {
-    if (channel < dims) {
-      return -2.0f * query.weights[i] * query.wanted[static_cast<size_t>(i) * dims + channel];
-    }
-    return channel == dims ? query.weights[i] : 0.0f;
-  };
+  channel_.resize(query.height, query.width);
+  lines_.resize(2 * query.height, spectra_->channels_ * transform.columns());
   for (int channel = 0; channel < spectra_->channels_; ++channel) {
     if (stop.stop_requested()) {
       return {};
     }
-    std::fill(plane_.begin(), plane_.end(), Complex{});
-    for (int y = 0; y < query.height; ++y) {
-      for (int x = 0; x < query.width; ++x) {
-        const int i = y * query.width + x;
-        plane_[static_cast<size_t>(y) * stride + x] = {query_value(i, 2 * channel),
-                                                       query_value(i, 2 * channel + 1)};
+    for (int x = 0; x < query.width; ++x) {
+      for (int y = 0; y < query.height; ++y) {
+        const size_t i = static_cast<size_t>(y) * query.width + x;
+        channel_(y, x) =
+            channel < dims ? -2.0f * query.weights[i] * query.wanted[i * dims + channel] : query.weights[i];
       }
     }
-    Forward2d(spectra_->plans_->forward, size, query.height, plane_, line_, query_spectra_[channel]);
+    transform.Across(channel_, channel, lines_);
   }
+  transform.Down(lines_, query_spectrum_);
 
   offsets_.clear();
-  const double scale = 1.0 / (static_cast<double>(size) * size);
   for (const int turn : turns) {
     const int num_u = spectra_->TurnedRegionWidth(turn) - query.width + 1;
     const int num_v = spectra_->TurnedRegionHeight(turn) - query.height + 1;
@@ -257,30 +215,13 @@ std::vector<Candidate> CandidateSearch::Search(const SearchQuery& query, int reg
     if (stop.stop_requested()) {
       return {};
     }
-    std::fill(sum_.begin(), sum_.end(), Complex{});
-    for (int channel = 0; channel < spectra_->channels_; ++channel) {
-      const float* q = reinterpret_cast<const float*>(query_spectra_[channel].data());
-      const float* e = reinterpret_cast<const float*>(
-          spectra_->spectra_[turn].data() +
-          (static_cast<size_t>(region) * spectra_->channels_ + channel) * plane_.size());
-      float* s = reinterpret_cast<float*>(sum_.data());
-      const size_t length = 2 * plane_.size();
-      for (size_t i = 0; i < length; i += 2) {
-        s[i] += q[i] * e[i] + q[i + 1] * e[i + 1];
-        s[i + 1] += q[i] * e[i + 1] - q[i + 1] * e[i];
-      }
-    }
-    // Lines of the spectrum are columns of the plane: transform along v first, then along u for the rows in
-    // use.
-    for (int x = 0; x < size; ++x) {
-      Transform(spectra_->plans_->inverse, sum_.data() + static_cast<size_t>(x) * stride, line_.data(), 1);
-      std::copy_n(line_.data(), size, turned_plane_.data() + static_cast<size_t>(x) * stride);
-    }
+    sum_.setZero(2 * transform.size(), transform.columns());
+    AddCorrelation(query_spectrum_, spectra_->spectra_[turn][region], spectra_->channels_, sum_);
+    transform.Back(sum_, num_u, num_v, columns_, correlation_);
     const auto [first_u, first_v] = spectra_->TurnedRegionOrigin(turn, region);
     for (int v = 0; v < num_v; ++v) {
-      Transform(spectra_->plans_->inverse, turned_plane_.data() + v, line_.data(), stride);
       for (int u = 0; u < num_u; ++u) {
-        const double squares = std::max(0.0, wanted_square + line_[u].real() * scale);
+        const double squares = std::max(0.0, wanted_square + double{correlation_(u, v)});
         offsets_.push_back({Patch{turn, first_u + u, first_v + v}, squares / norm});
       }
     }

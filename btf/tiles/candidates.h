@@ -3,17 +3,17 @@
 // sees one region, so that its price is the windows' affair and not the exemplar's.
 //
 // With weights w and wanted points c, the cost of an offset is sum w |c - e|^2 = sum w |c|^2 - 2 sum (w c) e
-// + sum w |e|^2: one correlation a dimension and one with |e|^2. Channels are correlated in pairs: the real
-// part of corr(q1 + i q2, e1 + i e2) is corr(q1, e1) + corr(q2, e2).
+// + sum w |e|^2: one correlation a dimension and one with |e|^2, added up as spectra.
 #pragma once
 
 #include <algorithm>
 #include <array>
-#include <complex>
 #include <cstdint>
 #include <memory>
 #include <span>
 #include <vector>
+
+#include <Eigen/Core>
 
 #include "btf/base/rng.h"
 #include "btf/base/run_context.h"
@@ -21,6 +21,8 @@
 #include "btf/tiles/seam_graph.h"
 
 namespace tessera {
+
+class FourierTransform;
 
 // Side of the regions for windows of up to three features, in texels.
 [[nodiscard]] int RegionSide(const Exemplar& exemplar, int feature_size);
@@ -44,7 +46,6 @@ class ExemplarSpectra {
 
  private:
   friend class CandidateSearch;
-  struct Plans;
 
   [[nodiscard]] int TurnedRegionWidth(int turn) const {
     return (turn & 1) == 0 ? region_width_ : region_height_;
@@ -59,11 +60,9 @@ class ExemplarSpectra {
   int region_width_ = 0;
   int region_height_ = 0;
   std::vector<std::array<int, 2>> regions_;  // first column and row, unturned
-  int size_ = 0;                             // of the square transform
-  int channels_ = 0;                         // complex ones
-  std::unique_ptr<Plans> plans_;
-  // [turn], empty for a turn not asked for; then [region][channel].
-  std::vector<std::vector<std::complex<float>>> spectra_;
+  int channels_ = 0;                         // search dimensions and the squared length
+  std::unique_ptr<FourierTransform> transform_;
+  std::vector<std::vector<Eigen::MatrixXf>> spectra_;  // [turn][region], empty for a turn not asked for
 };
 
 // How often each exemplar pixel has been used, whatever the turn. Sums over rectangles in constant time.
@@ -113,9 +112,7 @@ class CandidateSearch {
 
  private:
   const ExemplarSpectra* spectra_;
-  std::vector<std::complex<float>> plane_, turned_plane_, sum_;
-  std::vector<std::vector<std::complex<float>>> query_spectra_;  // [channel]
-  std::vector<std::complex<float>> line_;
+  Eigen::MatrixXf channel_, lines_, query_spectrum_, sum_, columns_, correlation_;
   std::vector<Candidate> offsets_;
 };
 
