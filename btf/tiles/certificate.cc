@@ -201,7 +201,7 @@ Seams BorderSeams(const Exemplar& exemplar, const Arrangement& arrangement, cons
   for (int strip = 0; strip < NumStrips(arrangement); ++strip) {
     std::array<std::vector<Side>, 2> sides_by_sign;
     for (int tile = 0; tile < static_cast<int>(arrangement.codes.size()); ++tile) {
-      const TileSides sides = SidesFromTileCode(arrangement.codes[tile]);
+      const TileSides sides = arrangement.SidesOf(tile);
       for (int side = 0; side < 4; ++side) {
         if (StripOfSide(arrangement, side, sides[side].colour) == strip) {
           sides_by_sign[sides[side].sign == Sign::kPlus ? 0 : 1].emplace_back(tile, side);

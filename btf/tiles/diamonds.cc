@@ -290,7 +290,7 @@ absl::StatusOr<IndexMaps> SynthesizeDiamonds(const Exemplar& exemplar, const Arr
   context.Report("tiles", 0, num_tiles, "tiles");
   ParallelFor(context, 0, num_tiles, 1, [&](int64_t tile, int64_t) {
     const std::vector<uint32_t> texels =
-        BuildFrame(arrangement, SidesFromTileCode(arrangement.codes[tile]), corners, maps.strips);
+        BuildFrame(arrangement, arrangement.SidesOf(tile), corners, maps.strips);
     std::ranges::copy(texels, maps.texels.begin() + static_cast<std::ptrdiff_t>(tile * tile_area));
     maps.tile_reports[tile] = MeasureTile(exemplar, texels, params);
   });

@@ -144,6 +144,7 @@ absl::StatusOr<IndexMaps> SynthesizeIndexMaps(const Exemplar& exemplar, const Ar
     return std::span(maps.texels).subspan(tile * tile_area, tile_area);
   };
   const int margin = params.strip_height / 2;
+  const std::vector<int> turns_of_tiles = TurnsOfTiles(arrangement);
   const auto tile_params = [&](int tile, const Siblings& siblings) {
     FillParams fill = fill_params(kTileSeed, tile);
     fill.turns = TurnsOfInterior(arrangement);
@@ -155,9 +156,9 @@ absl::StatusOr<IndexMaps> SynthesizeIndexMaps(const Exemplar& exemplar, const Ar
   for (int tile = 0; tile < num_tiles; ++tile) {
     const std::span<uint32_t> texels = texels_of(tile);
     const std::vector<uint32_t> frame =
-        BuildFrame(arrangement, SidesFromTileCode(arrangement.codes[tile]), corners, maps.strips);
+        BuildFrame(arrangement, arrangement.SidesOf(tile), corners, maps.strips);
     std::copy(frame.begin(), frame.end(), texels.begin());
-    const Siblings siblings(maps.texels, size, margin, tile);
+    const Siblings siblings(maps.texels, size, margin, tile, turns_of_tiles);
     TESSERA_RETURN_IF_ERROR(LayInterior(exemplar, size, tile_params(tile, siblings), context, filler, texels,
                                         maps.tile_reports[tile]));
     // Insides only: how often a strip is shown is the arrangement's affair.
@@ -171,7 +172,7 @@ absl::StatusOr<IndexMaps> SynthesizeIndexMaps(const Exemplar& exemplar, const Ar
   statuses.assign(num_tiles, absl::OkStatus());
   ParallelFor(context, 0, num_tiles, 1, [&](int64_t begin, int64_t) {
     const int tile = static_cast<int>(begin);
-    const Siblings siblings(laid, size, margin, tile);
+    const Siblings siblings(laid, size, margin, tile, turns_of_tiles);
     Filler filler(spectra);
     statuses[tile] = ImproveInterior(exemplar, size, tile_params(tile, siblings), context, filler,
                                      texels_of(tile), maps.tile_reports[tile]);

@@ -10,6 +10,7 @@
 
 #include "btf/base/parallel.h"
 #include "btf/base/status_macros.h"
+#include "btf/tiles/tile_sides.h"
 #include "btf/wang/dress.h"
 
 namespace tessera {
@@ -65,14 +66,7 @@ absl::StatusOr<Field> FieldOfPlane(const Exemplar& exemplar, const Arrangement& 
     const auto tile = static_cast<int>(dressing.tile[quad]);
     for (int v = 0; v < size; ++v) {
       for (int u = 0; u < size; ++u) {
-        // Where the tile turned counter-clockwise takes this texel from.
-        int x = u;
-        int y = v;
-        for (int turn = 0; turn < dressing.turns[quad]; ++turn) {
-          const int turned_x = size - 1 - y;
-          y = x;
-          x = turned_x;
-        }
+        const auto [x, y] = TilePixelBeforeTurns(u, v, dressing.turns[quad], size);
         field.points[static_cast<size_t>(top + v) * side + left + u] =
             exemplar.Point(TurnTexel(maps.texel(tile, x, y), dressing.turns[quad]));
       }

@@ -2,7 +2,10 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <utility>
 #include <vector>
+
+#include "btf/tiles/tile_sides.h"
 
 namespace tessera {
 namespace {
@@ -13,14 +16,15 @@ constexpr double kMostRepeated = 0.15;
 
 // A texel the cut brings, and where in a tile.
 struct NewTexel {
-  size_t index = 0;
+  int x = 0;
+  int y = 0;
   uint32_t texel = kNoTexel;
 };
 
 }  // namespace
 
-Siblings::Siblings(std::span<const uint32_t> texels, int size, int margin, int self)
-    : texels_(texels), size_(size), margin_(margin), self_(self) {}
+Siblings::Siblings(std::span<const uint32_t> texels, int size, int margin, int self, std::vector<int> turns)
+    : texels_(texels), size_(size), margin_(margin), self_(self), turns_(std::move(turns)) {}
 
 bool Siblings::Repeats(const Exemplar& exemplar, const Window& window, const Patch& patch,
                        const PatchCut& cut) const {
@@ -33,8 +37,8 @@ bool Siblings::Repeats(const Exemplar& exemplar, const Window& window, const Pat
     for (int x = first_x; x < end_x; ++x) {
       const size_t in_window = static_cast<size_t>(y - window.y) * window.width + (x - window.x);
       if (cut.takes_new[in_window] != 0) {
-        brought.push_back({static_cast<size_t>(y) * size_ + x,
-                           exemplar.TexelAt(patch.turn, patch.u + x - window.x, patch.v + y - window.y)});
+        brought.push_back(
+            {x, y, exemplar.TexelAt(patch.turn, patch.u + x - window.x, patch.v + y - window.y)});
       }
     }
   }
@@ -44,13 +48,20 @@ bool Siblings::Repeats(const Exemplar& exemplar, const Window& window, const Pat
   }
   const size_t tile_area = static_cast<size_t>(size_) * size_;
   const int num_tiles = static_cast<int>(texels_.size() / tile_area);
-  for (int tile = 0; tile < num_tiles; ++tile) {
-    const auto sibling = texels_.subspan(tile * tile_area, tile_area);
-    const auto num_repeated = std::count_if(brought.begin(), brought.end(), [&](const NewTexel& texel) {
-      return sibling[texel.index] == texel.texel;
-    });
-    if (tile != self_ && static_cast<double>(num_repeated) > limit) {
-      return true;
+  std::vector<std::pair<size_t, uint32_t>> wanted;  // index in a sibling, texel there
+  for (const int turns : turns_) {
+    wanted.clear();
+    for (const NewTexel& at : brought) {
+      const auto [x, y] = TilePixelBeforeTurns(at.x, at.y, turns, size_);
+      wanted.emplace_back(static_cast<size_t>(y) * size_ + x, TurnTexel(at.texel, 4 - turns));
+    }
+    for (int tile = 0; tile < num_tiles; ++tile) {
+      const auto sibling = texels_.subspan(tile * tile_area, tile_area);
+      const auto num_repeated =
+          std::ranges::count_if(wanted, [&](const auto& at) { return sibling[at.first] == at.second; });
+      if (tile != self_ && static_cast<double>(num_repeated) > limit) {
+        return true;
+      }
     }
   }
   return false;

@@ -1,12 +1,13 @@
 // What the tiles of one set show in the same place: on a grid of tiles it comes back in step with the grid,
 // and the eye finds it at once. The same content somewhere else in another tile is far less seen.
 //
-//   Siblings siblings(maps.texels, /*size=*/64, /*margin=*/8, /*self=*/3);
+//   Siblings siblings(maps.texels, /*size=*/64, /*margin=*/8, /*self=*/3, /*turns=*/{0});
 //   bool seen = siblings.Repeats(canvas, window, patch, cut);
 #pragma once
 
 #include <cstdint>
 #include <span>
+#include <vector>
 
 #include "btf/tiles/seam_graph.h"
 
@@ -16,11 +17,11 @@ class Siblings {
  public:
   // `texels` of all tiles, [tiles][size][size], kNoTexel where none is yet, must outlive this; tile `self` is
   // left out. Frames meet in place because tiles share sides, so nothing less than `margin` from the border
-  // is looked at.
-  Siblings(std::span<const uint32_t> texels, int size, int margin, int self);
+  // is looked at. Siblings are seen laid with each of `turns`, quarter turns against `self`.
+  Siblings(std::span<const uint32_t> texels, int size, int margin, int self, std::vector<int> turns);
 
   // Would the cut bring more than 15% of the window's texels from one and the same sibling, in place?
-  // Cost: the window's texels times the tiles.
+  // Cost: the window's texels times the tiles times their turns.
   [[nodiscard]] bool Repeats(const Exemplar& exemplar, const Window& window, const Patch& patch,
                              const PatchCut& cut) const;
 
@@ -29,6 +30,7 @@ class Siblings {
   int size_;
   int margin_;
   int self_;
+  std::vector<int> turns_;
 };
 
 }  // namespace tessera

@@ -3,11 +3,6 @@
 #include <algorithm>
 
 namespace tessera {
-namespace {
-
-constexpr int kNumColours = 2;
-
-}  // namespace
 
 StripTexel StripTexelAt(int side, Sign sign, int along, int depth, int tile_size, int strip_height) {
   const int half = strip_height / 2;
@@ -31,24 +26,42 @@ std::array<int, 2> TilePixelAt(int side, int along, int depth, int tile_size) {
   }
 }
 
+std::array<int, 2> TilePixelBeforeTurns(int x, int y, int turns, int tile_size) {
+  for (int turn = 0; turn < turns; ++turn) {
+    const int turned_x = tile_size - 1 - y;
+    y = x;
+    x = turned_x;
+  }
+  return {x, y};
+}
+
 int NumStrips(const Arrangement& arrangement) {
-  return arrangement.turned_strips ? kNumColours : 2 * kNumColours;
+  return arrangement.turned_strips ? arrangement.num_colours : 2 * arrangement.num_colours;
 }
 
 int StripOfSide(const Arrangement& arrangement, int side, int colour) {
   const bool vertical = (side & 1) != 0;
-  return colour + (!arrangement.turned_strips && vertical ? kNumColours : 0);
+  return colour + (!arrangement.turned_strips && vertical ? arrangement.num_colours : 0);
 }
 
 std::vector<int> TurnsOfStrip(const Arrangement& arrangement, int strip) {
   if (arrangement.turned_strips) {
     return {0, 1, 2, 3};
   }
-  return {strip < kNumColours ? 0 : 3};
+  return {strip < arrangement.num_colours ? 0 : 3};
 }
 
 std::vector<int> TurnsOfInterior(const Arrangement& arrangement) {
   return arrangement.turned_strips ? std::vector<int>{0, 1, 2, 3} : std::vector<int>{0};
+}
+
+std::vector<int> TurnsOfTiles(const Arrangement& arrangement) {
+  const auto is_listed_turned = [&](uint32_t code) {
+    const TileSides sides = SidesFromTileCode(code, arrangement.num_colours);
+    return arrangement.IndexOfCode(TileCode(SidesCountedFrom(sides, 1), arrangement.num_colours)) >= 0;
+  };
+  const bool turned = arrangement.turned_strips && !std::ranges::all_of(arrangement.codes, is_listed_turned);
+  return turned ? std::vector<int>{0, 1, 2, 3} : std::vector<int>{0};
 }
 
 CornerPair CornerPairOf(const Arrangement& arrangement, const TileSides& sides, int side) {
@@ -59,8 +72,8 @@ CornerPair CornerPairOf(const Arrangement& arrangement, const TileSides& sides, 
 
 std::vector<CornerPair> CornerPairs(const Arrangement& arrangement) {
   std::vector<CornerPair> pairs;
-  for (const uint32_t code : arrangement.codes) {
-    const TileSides sides = SidesFromTileCode(code);
+  for (size_t tile = 0; tile < arrangement.codes.size(); ++tile) {
+    const TileSides sides = arrangement.SidesOf(tile);
     for (int side = 0; side < 4; ++side) {
       const CornerPair pair = CornerPairOf(arrangement, sides, side);
       if (std::find(pairs.begin(), pairs.end(), pair) == pairs.end()) {

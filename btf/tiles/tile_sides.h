@@ -33,6 +33,10 @@ StripTexel StripTexelAt(int side, Sign sign, int along, int depth, int tile_size
 // Column and row of a tile at (along, depth) of a side.
 std::array<int, 2> TilePixelAt(int side, int along, int depth, int tile_size);
 
+// Column and row, in the tile as listed, of what stands at column x, row y of the tile turned by `turns`
+// quarter turns counter-clockwise.
+std::array<int, 2> TilePixelBeforeTurns(int x, int y, int turns, int tile_size);
+
 // The strips of an arrangement, numbered: by colour in surface-*; horizontal colours, then vertical ones, in
 // plane-*.
 int NumStrips(const Arrangement& arrangement);
@@ -41,6 +45,9 @@ int StripOfSide(const Arrangement& arrangement, int side, int colour);
 std::vector<int> TurnsOfStrip(const Arrangement& arrangement, int strip);
 // Turns that the texels of a tile's inside may have.
 std::vector<int> TurnsOfInterior(const Arrangement& arrangement);
+// Turns that one tile may be laid with against another: 0 alone where every code that a turn makes of another
+// is listed, for then dressings turn no tile, and in plane-*, where they turn all alike.
+std::vector<int> TurnsOfTiles(const Arrangement& arrangement);
 
 // One end of a strip: h / 2 columns, h rows.
 enum class StripEnd { kStart = 0, kEnd = 1 };

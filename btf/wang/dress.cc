@@ -24,38 +24,30 @@ constexpr size_t kBreaksInMessage = 3;
 constexpr size_t kBreaksInMetadata = 10000;
 
 // The sides that a face needs, in face order: colours by edge, signs by trail.
-std::vector<TileSides> SidesByTrails(const QuadAdjacency& adjacency, const MeshEdges& edges, uint64_t seed) {
+std::vector<TileSides> SidesByTrails(const QuadAdjacency& adjacency, const MeshEdges& edges, uint64_t seed,
+                                     int num_colours) {
   const std::vector<std::array<Sign, 4>> signs = EulerSigns(adjacency, seed);
   std::vector<TileSides> sides(adjacency.across.size());
   for (size_t face = 0; face < sides.size(); ++face) {
     for (int k = 0; k < 4; ++k) {
-      sides[face][k] = {EdgeColour(seed, edges.keys[edges.edge_of[face][k]]), signs[face][k]};
+      sides[face][k] = {EdgeColour(seed, edges.keys[edges.edge_of[face][k]], num_colours), signs[face][k]};
     }
   }
   return sides;
 }
 
 // Likewise, with the signs that a frame gives: tile sides south and east '+', north and west '-'.
-std::vector<TileSides> SidesByFrame(const std::vector<uint8_t>& turns, const MeshEdges& edges,
-                                    uint64_t seed) {
+std::vector<TileSides> SidesByFrame(const std::vector<uint8_t>& turns, const MeshEdges& edges, uint64_t seed,
+                                    int num_colours) {
   std::vector<TileSides> sides(turns.size());
   for (size_t face = 0; face < sides.size(); ++face) {
     for (int k = 0; k < 4; ++k) {
       const int tile_side = (k - turns[face]) & 3;
-      sides[face][k] = {EdgeColour(seed, edges.keys[edges.edge_of[face][k]]),
+      sides[face][k] = {EdgeColour(seed, edges.keys[edges.edge_of[face][k]], num_colours),
                         tile_side < 2 ? Sign::kPlus : Sign::kMinus};
     }
   }
   return sides;
-}
-
-// The code of the tile that shows `sides` (in face order) when laid with `turns`.
-uint32_t CodeWhenLaid(const TileSides& sides, int turns) {
-  TileSides tile;
-  for (int j = 0; j < 4; ++j) {
-    tile[j] = sides[(j + turns) & 3];
-  }
-  return TileCode(tile);
 }
 
 nlohmann::json BreaksJson(const std::vector<Break>& breaks) {
@@ -111,7 +103,7 @@ absl::StatusOr<std::vector<Break>> FindBreaks(const Dressing& dressing, const Ar
   TESSERA_ASSIGN_OR_RETURN(const auto neighbours, BuildTileNeighbours(dressing));
   std::vector<Break> breaks;
   for (uint32_t face = 0; face < neighbours.size(); ++face) {
-    const TileSides sides = SidesFromTileCode(arrangement.codes[dressing.tile[face]]);
+    const TileSides sides = arrangement.SidesOf(dressing.tile[face]);
     for (int face_side = 0; face_side < 4; ++face_side) {
       const int side = (face_side - dressing.turns[face]) & 3;
       const TileNeighbour& other = neighbours[face][side];
@@ -119,7 +111,7 @@ absl::StatusOr<std::vector<Break>> FindBreaks(const Dressing& dressing, const Ar
       if (other.face < static_cast<int64_t>(face)) {
         continue;
       }
-      const TileSides other_sides = SidesFromTileCode(arrangement.codes[dressing.tile[other.face]]);
+      const TileSides other_sides = arrangement.SidesOf(dressing.tile[other.face]);
       const bool same_pool = arrangement.turned_strips || other.turns == 0;
       if (!same_pool || !SidesMatch(sides[side], other_sides[other.side])) {
         breaks.push_back({face, static_cast<uint8_t>(face_side), static_cast<uint32_t>(other.face),
@@ -150,22 +142,21 @@ absl::StatusOr<DressResult> DressMesh(const QuadMesh& mesh, const Arrangement& a
 
   TESSERA_ASSIGN_OR_RETURN(const QuadAdjacency adjacency, BuildAdjacency(dressing.mesh));
   const MeshEdges edges = ListEdges(adjacency);
-  const std::vector<TileSides> sides = arrangement.turned_strips
-                                           ? SidesByTrails(adjacency, edges, params.seed)
-                                           : SidesByFrame(ConsistentTurns(adjacency), edges, params.seed);
+  const std::vector<TileSides> sides =
+      arrangement.turned_strips
+          ? SidesByTrails(adjacency, edges, params.seed, arrangement.num_colours)
+          : SidesByFrame(ConsistentTurns(adjacency), edges, params.seed, arrangement.num_colours);
   dressing.tile.resize(sides.size());
   dressing.turns.resize(sides.size());
   for (size_t face = 0; face < sides.size(); ++face) {
-    int tile = -1;
-    for (int turns = 0; turns < 4 && tile < 0; ++turns) {
-      tile = arrangement.IndexOfCode(CodeWhenLaid(sides[face], turns));
-      dressing.turns[face] = static_cast<uint8_t>(turns);
-    }
-    if (tile < 0) {
+    const Arrangement::Laid laid = arrangement.TileShowing(sides[face]);
+    if (laid.tile < 0) {
       return absl::InternalError(absl::StrCat(arrangement.id, " has no tile of code ",
-                                              CodeWhenLaid(sides[face], 0), " in any turn"));
+                                              TileCode(sides[face], arrangement.num_colours),
+                                              " in any turn"));
     }
-    dressing.tile[face] = static_cast<uint32_t>(tile);
+    dressing.tile[face] = static_cast<uint32_t>(laid.tile);
+    dressing.turns[face] = static_cast<uint8_t>(laid.turns);
   }
   TESSERA_RETURN_IF_ERROR(context.CheckStop());
   context.Report(kStage, 2, kNumSteps, "steps");

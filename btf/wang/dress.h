@@ -21,7 +21,7 @@ namespace tessera {
 
 struct DressParams {
   uint64_t seed = 1;
-  // Accept edges across which an unturned arrangement ("plane-16") cannot match; they are listed either way.
+  // Accept edges across which an unturned arrangement ("plane-*") cannot match; they are listed either way.
   bool allow_breaks = false;
   // Subdivide to about this many quads, 0 for the rule of subdivide.h. Meshes are never coarsened.
   uint32_t target_quads = 0;

@@ -69,8 +69,8 @@ std::vector<std::array<Sign, 4>> EulerSigns(const QuadAdjacency& adjacency, uint
   return signs;
 }
 
-int EdgeColour(uint64_t seed, uint32_t edge_key) {
-  return static_cast<int>(Mix64(seed, edge_key) & 1);
+int EdgeColour(uint64_t seed, uint32_t edge_key, int num_colours) {
+  return static_cast<int>(Mix64(seed, edge_key) % static_cast<uint64_t>(num_colours));
 }
 
 }  // namespace tessera

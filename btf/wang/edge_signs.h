@@ -22,7 +22,7 @@ namespace tessera {
 // sign patterns are about equally frequent and all of a set's tiles are used. Linear time.
 [[nodiscard]] std::vector<std::array<Sign, 4>> EulerSigns(const QuadAdjacency& adjacency, uint64_t seed);
 
-// The colour of an edge: the lowest bit of Mix64(seed, key), key = 4 face + side of its lowest (face, side).
-[[nodiscard]] int EdgeColour(uint64_t seed, uint32_t edge_key);
+// The colour of an edge: Mix64(seed, key) mod num_colours, key = 4 face + side of its lowest (face, side).
+[[nodiscard]] int EdgeColour(uint64_t seed, uint32_t edge_key, int num_colours);
 
 }  // namespace tessera

@@ -14,10 +14,11 @@ absl::Status ListArrangements(Session& session) {
   TESSERA_ASSIGN_OR_RETURN(const std::vector<v1::Arrangement> arrangements,
                            client->ListArrangements(session.Context()));
   Json all = Json::array();
-  std::vector<std::vector<std::string>> rows = {{"ARRANGEMENT", "TILES", "STRIPS", "SHA-256"}};
+  std::vector<std::vector<std::string>> rows = {{"ARRANGEMENT", "TILES", "COLOURS", "STRIPS", "SHA-256"}};
   for (const v1::Arrangement& arrangement : arrangements) {
     all.push_back(Describe(arrangement));
     rows.push_back({ShortName(arrangement.name()), std::to_string(arrangement.tile_codes_size()),
+                    std::to_string(arrangement.num_colours()),
                     arrangement.turned_strips() ? "turned" : "unturned", arrangement.sha256()});
   }
   session.Answer({{"arrangements", std::move(all)}}, TextTable(rows));
@@ -43,7 +44,7 @@ void AddArrangementCommands(CLI::App& app, Session& session) {
 
   const auto name = std::make_shared<std::string>();
   CLI::App* show = noun->add_subcommand("show", "One arrangement and its tile codes");
-  show->add_option("ARRANGEMENT", *name, "plane-16, surface-96")->required();
+  show->add_option("ARRANGEMENT", *name, "plane-16, plane-81, surface-26, surface-96..")->required();
   show->callback(
       [&session, name] { session.run = [&session, name] { return ShowArrangement(session, *name); }; });
 }

@@ -106,11 +106,9 @@ Json Describe(const v1::Arrangement& arrangement) {
   for (const uint32_t code : arrangement.tile_codes()) {
     codes.push_back(code);
   }
-  return {{"name", ShortName(arrangement.name())},
-          {"num_tiles", arrangement.tile_codes_size()},
-          {"turned_strips", arrangement.turned_strips()},
-          {"sha256", arrangement.sha256()},
-          {"tile_codes", std::move(codes)}};
+  return {{"name", ShortName(arrangement.name())},    {"num_tiles", arrangement.tile_codes_size()},
+          {"num_colours", arrangement.num_colours()}, {"turned_strips", arrangement.turned_strips()},
+          {"sha256", arrangement.sha256()},           {"tile_codes", std::move(codes)}};
 }
 
 Json Describe(const v1::TileSet& tile_set) {

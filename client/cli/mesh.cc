@@ -254,7 +254,8 @@ void AddMeshCommands(CLI::App& app, Session& session) {
   CLI::App* dress =
       noun->add_subcommand("dress", "Give each quad a tile of an arrangement; done here, once per mesh");
   dress->add_option("MESH", dress_flags->mesh, kMeshHelp)->required();
-  dress->add_option("--arrangement", dress_flags->arrangement, "plane-16 or surface-96")->required();
+  dress->add_option("--arrangement", dress_flags->arrangement, "plane-16, plane-81, surface-26, surface-96..")
+      ->required();
   dress->add_option("--seed", dress_flags->seed, "Same seed, same dressing")->capture_default_str();
   dress->add_flag("--allow-breaks", dress_flags->allow_breaks,
                   "Accept edges where an unturned arrangement cannot match");

@@ -186,7 +186,8 @@ void AddSynthesize(CLI::App& noun, Session& session) {
   CLI::App* command =
       noun.add_subcommand("synthesize", "The tiles of a material in an arrangement, by the server");
   command->add_option("MATERIAL", flags->material, "Name of the material")->required();
-  command->add_option("--arrangement", flags->arrangement, "plane-16 or surface-96")->required();
+  command->add_option("--arrangement", flags->arrangement, "plane-16, plane-81, surface-26, surface-96..")
+      ->required();
   command->add_option("--name", flags->name, "Name of the tile set [the material's]");
   command->add_option("--tile", flags->tile_size, "Texels per tile side, at least twice the strip")
       ->capture_default_str();

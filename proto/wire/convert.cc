@@ -47,6 +47,7 @@ v1::Arrangement MessageFromArrangement(const Arrangement& arrangement) {
   message.set_sha256(arrangement.sha256);
   message.mutable_tile_codes()->Add(arrangement.codes.begin(), arrangement.codes.end());
   message.set_turned_strips(arrangement.turned_strips);
+  message.set_num_colours(arrangement.num_colours);
   return message;
 }
 
@@ -55,6 +56,20 @@ absl::StatusOr<Arrangement> ArrangementFromMessage(const v1::Arrangement& messag
   TESSERA_ASSIGN_OR_RETURN(arrangement.id, ParseArrangementName(message.name()));
   arrangement.codes.assign(message.tile_codes().begin(), message.tile_codes().end());
   arrangement.turned_strips = message.turned_strips();
+  if (message.num_colours() > kMostColours) {
+    return absl::InvalidArgumentError(absl::StrCat(message.name(), ": ", message.num_colours(),
+                                                   " colours, expected at most ", kMostColours));
+  }
+  if (message.num_colours() != 0) {
+    arrangement.num_colours = static_cast<int>(message.num_colours());
+  }
+  for (size_t tile = 0; tile < arrangement.codes.size(); ++tile) {
+    if (TileCode(arrangement.SidesOf(tile), arrangement.num_colours) != arrangement.codes[tile]) {
+      return absl::InvalidArgumentError(absl::StrCat(message.name(), ": tile code ", arrangement.codes[tile],
+                                                     " does not exist with ", arrangement.num_colours,
+                                                     " colours"));
+    }
+  }
   const std::string listing = ArrangementListing(arrangement);
   arrangement.sha256 = Sha256Hex(std::as_bytes(std::span(listing)));
   if (arrangement.sha256 != message.sha256()) {

@@ -24,7 +24,8 @@ namespace tessera {
 
 [[nodiscard]] v1::Arrangement MessageFromArrangement(const Arrangement& arrangement);
 // The arrangement as the server sent it; its id is the name's.
-// Errors: INVALID_ARGUMENT (name, or codes that the listing's SHA-256 does not match).
+// Errors: INVALID_ARGUMENT (name, codes that do not exist with its colours or that the listing's SHA-256 does
+// not match).
 [[nodiscard]] absl::StatusOr<Arrangement> ArrangementFromMessage(const v1::Arrangement& message);
 
 // What a catalog tells of a container: every field but name, blob and create_time.

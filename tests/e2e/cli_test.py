@@ -284,7 +284,8 @@ class MainJobTest(harness.CommandTest):
 
     def test_e_dress_and_redress(self):
         self.assertEqual([a["name"] for a in self.run_json("arrangement", "list")["arrangements"]],
-                         ["plane-16", "surface-96"])
+                         ["plane-16", "plane-81", "surface-26", "surface-96"])
+        self.assertEqual(self.run_json("arrangement", "show", "plane-81")["num_colours"], 3)
         self.assertEqual(self.run_json("arrangement", "show", "surface-96")["num_tiles"], 96)
         here = self.run_json("mesh", "dress", "builtin:torus", "--arrangement", "surface-96", "--seed", 5, "-o", "here.tsra")
         there = self.run_json("mesh", "dress", "builtin:torus", "--arrangement", "surface-96", "--seed", 5, "--on-server",
@@ -302,6 +303,22 @@ class MainJobTest(harness.CommandTest):
         self.assert_fails(5, "mesh", "dress", "builtin:genus3", "--arrangement", "plane-16", "-o", "g.tsra", says="break")
         # A container of another kind is no dressing.
         self.assert_fails(5, "mesh", "redress", "skin-tiles.tsra", "--tileset", "surface-96/skin")
+
+    def test_e_every_other_arrangement(self):
+        for arrangement, mesh, num_tiles in (("plane-81", "torus", 81), ("surface-26", "genus3", 26)):
+            name = f"{arrangement}/skin"
+            made = self.run_json("tileset", "synthesize", "skin", "--arrangement", arrangement, "--tile", 16, "--strip", 8,
+                                 "--force")
+            self.assertEqual((made["tile_set"]["name"], made["tile_set"]["num_tiles"]), (name, num_tiles))
+            dressed = self.run_json("mesh", "dress", f"builtin:{mesh}", "--arrangement", arrangement, "-o", "other.tsra")
+            bound = self.run_json("mesh", "redress", "other.tsra", "--tileset", name)
+            self.assertEqual(bound["num_quads"], dressed["num_quads"])
+            self.run_ok("tileset", "certify", name)
+            self.run_ok("tileset", "sheet", name, "-o", "other-tiles.png")
+            self.run_ok("preview", name, "--dressing", "other.tsra", "--size", "64x48", "-o", "other.png")
+            self.assertGreater(self.picture("other.png")[2], 100)
+            self.assert_fails(5, "mesh", "redress", "here.tsra", "--tileset", name, says=arrangement)
+            self.run_ok("tileset", "delete", name)
 
     def test_f_preview(self):
         self.run_ok("preview", "surface-96/skin", "--dressing", "here.tsra", "--light", "35,120", "--size", "160x120",

@@ -1,5 +1,6 @@
 #include "proto/wire/convert.h"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 namespace tessera {
@@ -21,11 +22,25 @@ TEST(ConvertTest, ArrangementsComeBackAndAreChecked) {
     ASSERT_TRUE(back.ok()) << back.status();
     EXPECT_EQ(back->id, arrangement.id);
     EXPECT_EQ(back->codes, arrangement.codes);
+    EXPECT_EQ(back->num_colours, arrangement.num_colours);
     EXPECT_EQ(back->turned_strips, arrangement.turned_strips);
     EXPECT_EQ(back->sha256, arrangement.sha256);
     message.set_tile_codes(0, message.tile_codes(0) + 1);
     EXPECT_EQ(ArrangementFromMessage(message).status().code(), absl::StatusCode::kInvalidArgument);
   }
+}
+
+TEST(ConvertTest, ArrangementsHaveTwoColoursUnlessTheySay) {
+  v1::Arrangement message = MessageFromArrangement(**FindArrangement("surface-96"));
+  message.clear_num_colours();
+  EXPECT_EQ(ArrangementFromMessage(message)->num_colours, 2);
+  message = MessageFromArrangement(**FindArrangement("plane-81"));
+  message.clear_num_colours();
+  EXPECT_THAT(std::string(ArrangementFromMessage(message).status().message()),
+              testing::HasSubstr("tile code 756 does not exist with 2 colours"));
+  message.set_num_colours(1u << 31);
+  EXPECT_THAT(std::string(ArrangementFromMessage(message).status().message()),
+              testing::HasSubstr("2147483648 colours, expected at most 127"));
 }
 
 TEST(ConvertTest, EncodeOptionsHaveDefaults) {

@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -15,6 +16,7 @@
 #include "btf/wang/arrangement.h"
 #include "btf/wang/dressing.h"
 #include "btf/wang/tile_set.h"
+#include "tests/btf/wang/turned_tiles.h"
 
 namespace tessera::testing {
 
@@ -95,8 +97,9 @@ inline BtfelTable WhiteDiffuser() {
 }
 
 // Tiles of random texels with random turns: no two borders match, so that nothing hides a wrong texel.
-inline TileSet RandomTileSet(BtfelTable btfels, int tile_size, uint64_t seed) {
-  const Arrangement& arrangement = **FindArrangement("surface-96");
+inline TileSet RandomTileSet(BtfelTable btfels, int tile_size, uint64_t seed,
+                             std::string_view arrangement_id = "surface-96") {
+  const Arrangement& arrangement = **FindArrangement(arrangement_id);
   TileSet tile_set;
   tile_set.arrangement_id = arrangement.id;
   tile_set.arrangement_sha256 = arrangement.sha256;
@@ -110,6 +113,16 @@ inline TileSet RandomTileSet(BtfelTable btfels, int tile_size, uint64_t seed) {
     texel = PackTexel(static_cast<uint32_t>(rng.NextBelow(tile_set.btfels.size())),
                       static_cast<int>(rng.NextBelow(4)));
   }
+  return tile_set;
+}
+
+// A set of surface-26 as one of surface-96 that shows the same.
+inline TileSet AsSurface96(TileSet tile_set) {
+  const Arrangement& arrangement = **FindArrangement("surface-96");
+  tile_set.arrangement_id = arrangement.id;
+  tile_set.arrangement_sha256 = arrangement.sha256;
+  tile_set.tile_codes = arrangement.codes;
+  tile_set.tile_index = Surface96FromSurface26(tile_set.tile_index, tile_set.tile_size);
   return tile_set;
 }
 

@@ -13,12 +13,14 @@
 #include "btf/render/composite.h"
 #include "btf/render/offscreen_context.h"
 #include "btf/render/reference.h"
+#include "btf/wang/dress.h"
 #include "btf/wang/shapes.h"
 #include "tests/btf/render/hand_made.h"
 
 namespace tessera {
 namespace {
 
+using testing::AsSurface96;
 using testing::CompareAwayFromSilhouettes;
 using testing::Comparison;
 using ::testing::HasSubstr;
@@ -83,6 +85,25 @@ INSTANTIATE_TEST_SUITE_P(Builtin, ShapePreviewTest, ::testing::ValuesIn(BuiltinS
                            std::replace(name.begin(), name.end(), '-', '_');
                            return name;
                          });
+
+TEST_F(PreviewTest, GlMatchesTheReferenceOnTilesLaidTurnedAndShowsTurnedTiles) {
+  const QuadMesh mesh = *BuiltinShape("genus3");
+  const Dressing turned = DressMesh(mesh, **FindArrangement("surface-26"), {}, run_)->dressing;
+  const Dressing unturned = DressMesh(mesh, **FindArrangement("surface-96"), {}, run_)->dressing;
+  const TileSet few = RandomTileSet(RandomBtfels(64, 9, 9, 2), 16, 3, "surface-26");
+  const TileSet all = AsSurface96(few);
+  PreviewScene scene{.dressing = &turned, .tile_set = &few, .width = kWidth, .height = kHeight};
+  scene.camera = FramingCamera(mesh, kWidth, kHeight);
+  ExpectAgreement(scene);
+  const auto image = RenderGl(*context_, scene, run_);
+  scene.dressing = &unturned;
+  scene.tile_set = &all;
+  const auto expected = RenderReferenceWithDepth(scene, run_);
+  ASSERT_TRUE(image.ok() && expected.ok()) << image.status() << expected.status();
+  // Nearest taps break their ties along the columns and rows of the tile, so single texels may differ.
+  const Comparison comparison = CompareAwayFromSilhouettes(*image, *expected);
+  EXPECT_LT(comparison.rmse, kRmseLimit) << "worst " << comparison.worst;
+}
 
 TEST_F(PreviewTest, GlMatchesTheReferenceOnSkewedQuadsMagnifiedAndMinified) {
   const Dressing dressing = RandomDressing(SkewedGrid(4, 0.3, 7), 8);

@@ -3,12 +3,15 @@
 #include <gtest/gtest.h>
 #include <Eigen/Geometry>
 
+#include "btf/wang/dress.h"
 #include "btf/wang/quad_mesh.h"
+#include "btf/wang/shapes.h"
 #include "tests/btf/render/hand_made.h"
 
 namespace tessera {
 namespace {
 
+using testing::AsSurface96;
 using testing::RandomBtfels;
 using testing::RandomDressing;
 using testing::RandomTileSet;
@@ -40,17 +43,24 @@ class SurfaceTest : public ::testing::Test {
   Dressing dressing_;
 };
 
-TEST_F(SurfaceTest, BothSidesOfEveryEdgeShowTheSameReflectance) {
-  const auto surface = DressedSurface::Create(dressing_, tile_set_);
-  ASSERT_TRUE(surface.ok()) << surface.status();
-  const auto decoder = MakeDecoder(tile_set_.btfels);
-  ASSERT_TRUE(decoder.ok()) << decoder.status();
-  const auto adjacency = BuildAdjacency(dressing_.mesh);
-  ASSERT_TRUE(adjacency.ok());
+// Returns how many edges were looked at.
+int ExpectSameReflectanceAcrossEdges(const Dressing& dressing, const TileSet& tile_set) {
+  const auto surface = DressedSurface::Create(dressing, tile_set);
+  const auto decoder = MakeDecoder(tile_set.btfels);
+  const auto adjacency = BuildAdjacency(dressing.mesh);
+  EXPECT_TRUE(surface.ok() && decoder.ok() && adjacency.ok()) << surface.status() << decoder.status();
+  if (!surface.ok() || !decoder.ok() || !adjacency.ok()) {
+    return 0;
+  }
   const Eigen::Vector3d to_light = Eigen::Vector3d(0.5, -0.3, 0.8).normalized();
   const Eigen::Vector3d eye(0.4, 0.3, 3.0);
+  const auto reflectance = [&](const SurfacePoint& point) {
+    const SurfaceFrame frame = surface->FrameAt(point);
+    return ReflectanceOfTaps(*surface, **decoder, frame, surface->BilinearTaps(point), to_light,
+                             (eye - frame.position).normalized());
+  };
   int edges = 0;
-  for (int face = 0; face < kFaces * kFaces; ++face) {
+  for (int face = 0; face < static_cast<int>(dressing.mesh.quads.size()); ++face) {
     for (int side = 0; side < 4; ++side) {
       const QuadAdjacency::Across across = adjacency->across[face][side];
       if (across.face <= face) {
@@ -60,11 +70,6 @@ TEST_F(SurfaceTest, BothSidesOfEveryEdgeShowTheSameReflectance) {
       for (int i = 0; i < 16; ++i) {
         // From vertex to vertex: the first and the last points lie within half a texel of them.
         const double along = 0.01 + 0.98 * i / 15.0;
-        const auto reflectance = [&](const SurfacePoint& point) {
-          const SurfaceFrame frame = surface->FrameAt(point);
-          return ReflectanceOfTaps(*surface, **decoder, frame, surface->BilinearTaps(point), to_light,
-                                   (eye - frame.position).normalized());
-        };
         const Eigen::Array3d here = reflectance(PointOnSide(face, side, along));
         const Eigen::Array3d there = reflectance(PointOnSide(across.face, across.side, 1.0 - along));
         // The other sides' weights on a side are 1e-6 / distance, distance at least 0.01: 1e-4 radians.
@@ -73,7 +78,44 @@ TEST_F(SurfaceTest, BothSidesOfEveryEdgeShowTheSameReflectance) {
       }
     }
   }
-  EXPECT_EQ(edges, 2 * kFaces * (kFaces - 1));
+  return edges;
+}
+
+TEST_F(SurfaceTest, BothSidesOfEveryEdgeShowTheSameReflectance) {
+  EXPECT_EQ(ExpectSameReflectanceAcrossEdges(dressing_, tile_set_), 2 * kFaces * (kFaces - 1));
+}
+
+TEST_F(SurfaceTest, TilesLaidTurnedShowTheSameReflectanceFromBothSides) {
+  const TileSet tile_set = RandomTileSet(RandomBtfels(64, 4, 4, 3), 8, 4, "surface-26");
+  const auto dressed =
+      DressMesh(*BuiltinShape("genus3"), **FindArrangement("surface-26"), {.seed = 2}, RunContext{});
+  ASSERT_TRUE(dressed.ok()) << dressed.status();
+  EXPECT_EQ(ExpectSameReflectanceAcrossEdges(dressed->dressing, tile_set),
+            static_cast<int>(2 * dressed->dressing.mesh.quads.size()));
+}
+
+// The turn of a dressing moves texels and turns what they reflect, exactly as turning the tile's own texels
+// does.
+TEST_F(SurfaceTest, TilesLaidTurnedShowWhatTurnedTilesShow) {
+  const TileSet few = RandomTileSet(RandomBtfels(64, 9, 9, 3), 8, 4, "surface-26");
+  const TileSet all = AsSurface96(few);
+  const QuadMesh mesh = *BuiltinShape("cube-sphere");
+  const Dressing turned = DressMesh(mesh, **FindArrangement("surface-26"), {}, RunContext{})->dressing;
+  const Dressing unturned = DressMesh(mesh, **FindArrangement("surface-96"), {}, RunContext{})->dressing;
+  const auto surface = DressedSurface::Create(turned, few);
+  const auto expected = DressedSurface::Create(unturned, all);
+  ASSERT_TRUE(surface.ok() && expected.ok()) << surface.status() << expected.status();
+  const auto decoder = *MakeDecoder(few.btfels);
+  const Eigen::Vector3d to_light = Eigen::Vector3d(0.5, -0.3, 0.8).normalized();
+  Rng rng(9);
+  for (int face = 0; face < static_cast<int>(mesh.quads.size()); ++face) {
+    const SurfacePoint point{face, rng.NextDouble(), rng.NextDouble()};
+    const auto reflectance = [&](const DressedSurface& on) {
+      const SurfaceFrame frame = on.FrameAt(point);
+      return ReflectanceOfTaps(on, *decoder, frame, on.BilinearTaps(point), to_light, frame.n);
+    };
+    EXPECT_LT((reflectance(*surface) - reflectance(*expected)).abs().maxCoeff(), kRounding) << face;
+  }
 }
 
 TEST_F(SurfaceTest, FramesAreOrthonormalAndEqualUpToQuarterTurnsAcrossEdges) {

@@ -1,5 +1,6 @@
 #include "btf/tiles/certificate.h"
 
+#include <numeric>
 #include <set>
 #include <utility>
 #include <vector>
@@ -8,7 +9,9 @@
 
 #include "btf/tiles/repetition.h"
 #include "btf/tiles/seam_controls.h"
+#include "btf/tiles/tile_sides.h"
 #include "tests/btf/tiles/noise_exemplar.h"
+#include "tests/btf/wang/turned_tiles.h"
 
 namespace tessera {
 namespace {
@@ -149,6 +152,47 @@ TEST(CertificateTest, SeesCutsAcrossTheBordersOfLegalPairs) {
   EXPECT_GT(border_figures(broken)["ratio"].get<double>(), 1.5);
 }
 
+TEST(CertificateTest, LooksAcrossEveryLegalPairOfEveryArrangement) {
+  const Exemplar exemplar(BumpyEmbedding(40, 40, 3));
+  for (const Arrangement& arrangement : BuiltinArrangements()) {
+    // One texel everywhere: what counts is how many pairs there are, and that turned tiles are seen turned.
+    IndexMaps maps{.tile_size = 4};
+    for (size_t tile = 0; tile < arrangement.codes.size(); ++tile) {
+      const TileSides sides = arrangement.SidesOf(tile);
+      for (int i = 0; i < 16; ++i) {
+        maps.texels.push_back(PackTexel(41, 0));
+      }
+      for (int side = 0; side < 4; ++side) {
+        for (int along = 1; along < 3; ++along) {
+          const auto [x, y] = TilePixelAt(side, along, 0, 4);
+          const StripTexel at = StripTexelAt(side, sides[side].sign, along, 0, 4, 2);
+          const int own_turns = TurnsOfStrip(arrangement, StripOfSide(arrangement, side, 0))[0];
+          maps.texels[tile * 16 + y * 4 + x] =
+              TurnTexel(exemplar.TexelAt(own_turns, 10 + at.x, 10 + at.y), at.turns);
+        }
+      }
+    }
+    const Seams seams = BorderSeams(exemplar, arrangement, maps);
+    double legal = 0.0;
+    for (size_t a = 0; a < arrangement.codes.size(); ++a) {
+      for (size_t b = 0; b < arrangement.codes.size(); ++b) {
+        for (int k = 0; k < 4; ++k) {
+          for (int j = 0; j < 4; ++j) {
+            const bool may_face = arrangement.turned_strips || (j - k + 4) % 4 == 2;
+            const TileSide side = arrangement.SidesOf(a)[k];
+            legal += side.sign == Sign::kPlus && may_face && SidesMatch(side, arrangement.SidesOf(b)[j]);
+          }
+        }
+      }
+    }
+    EXPECT_EQ(seams.num_pairs, 4 * legal) << arrangement.id;
+    // Inner texels go on across the border, ends do not.
+    const double inner = std::accumulate(seams.pairs.begin(), seams.pairs.end(), 0.0,
+                                         [](double sum, const CutPair& pair) { return sum + pair.weight; });
+    EXPECT_EQ(inner, 2 * legal) << arrangement.id;
+  }
+}
+
 TEST(CertificateTest, ControlsScoreAsTheyMust) {
   const Exemplar exemplar(BumpyEmbedding(64, 64, 3));
   EXPECT_EQ(RatioOf(exemplar, FalseCuts(exemplar, 8)), 1.0);
@@ -194,6 +238,16 @@ TEST(RepetitionTest, TellsOneTileEverywhereFromManyTiles) {
   EXPECT_NEAR((*one)["plane_peak"].get<double>(), 1.0, 1e-3);
   EXPECT_LT((*many)["plane_peak"].get<double>(), 0.7);
   EXPECT_EQ((*many)["exemplar_peak"], (*one)["exemplar_peak"]);
+}
+
+TEST(RepetitionTest, SeesTurnedTilesAsTheyAreLaid) {
+  const Exemplar exemplar(BumpyEmbedding(64, 64, 4));
+  IndexMaps maps = Synthesized(exemplar, **FindArrangement("surface-26"));
+  const auto few = MeasureRepetition(exemplar, **FindArrangement("surface-26"), maps, 8, RunContext{});
+  maps.texels = Surface96FromSurface26(maps.texels, maps.tile_size);
+  const auto all = MeasureRepetition(exemplar, **FindArrangement("surface-96"), maps, 8, RunContext{});
+  ASSERT_TRUE(few.ok() && all.ok()) << few.status() << all.status();
+  EXPECT_EQ(*few, *all);
 }
 
 }  // namespace

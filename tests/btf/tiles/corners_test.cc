@@ -35,7 +35,7 @@ std::array<int, 4> Rectangle(const Exemplar& exemplar, const Patch& patch, int s
 // A set cut from one patch has no seams, and every vertex and tile looks alike.
 TEST(ChooseCornersTest, TakesEverySampleFromAnotherPlace) {
   const Exemplar exemplar(BumpyEmbedding(80, 72, 1));
-  for (const char* const arrangement : {"plane-16", "surface-96"}) {
+  for (const char* const arrangement : {"plane-16", "plane-81", "surface-96"}) {
     for (const uint64_t seed : {1, 2}) {
       const Corners corners = Choose(exemplar, arrangement, kStripHeight, seed);
       for (size_t i = 0; i < corners.samples.size(); ++i) {
@@ -55,7 +55,7 @@ TEST(ChooseCornersTest, TakesEverySampleFromAnotherPlace) {
 // What lies beyond a sample counts in its cuts, so a sample at the rim would look cheaper than it is.
 TEST(ChooseCornersTest, KeepsSamplesOffTheRim) {
   const Exemplar exemplar(BumpyEmbedding(48, 40, 2));
-  for (const char* const arrangement : {"plane-16", "surface-96"}) {
+  for (const char* const arrangement : {"plane-16", "plane-81", "surface-96"}) {
     for (const Patch& sample : Choose(exemplar, arrangement, kStripHeight, 1).samples) {
       const auto [x0, y0, x1, y1] = Rectangle(exemplar, sample, kStripHeight);
       EXPECT_GE(std::min(x0, y0), kStripHeight / 2) << arrangement;
@@ -67,7 +67,7 @@ TEST(ChooseCornersTest, KeepsSamplesOffTheRim) {
 
 TEST(ChooseCornersTest, FindsRoomInTheSmallestExemplar) {
   const Exemplar exemplar(BumpyEmbedding(32, 32, 3));
-  for (const char* const arrangement : {"plane-16", "surface-96"}) {
+  for (const char* const arrangement : {"plane-16", "plane-81", "surface-96"}) {
     EXPECT_FALSE(Choose(exemplar, arrangement, 16, 1).samples.empty());
   }
 }

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <map>
 #include <string>
 #include <vector>
 
@@ -10,6 +11,9 @@
 
 #include "btf/base/reason.h"
 #include "btf/tiles/tile_sides.h"
+#include "btf/wang/dress.h"
+#include "btf/wang/neighbour.h"
+#include "btf/wang/shapes.h"
 #include "tests/btf/tiles/legal_pairs.h"
 #include "tests/btf/tiles/noise_exemplar.h"
 
@@ -17,6 +21,22 @@ namespace tessera {
 namespace {
 
 using testing::HasSubstr;
+
+// Pairs of a '+' and a '-' side of one colour, whatever the tiles.
+int NumLegalPairs(const char* arrangement_id) {
+  const Arrangement& arrangement = **FindArrangement(arrangement_id);
+  std::map<int, std::array<int, 2>> count;
+  for (size_t tile = 0; tile < arrangement.codes.size(); ++tile) {
+    for (const TileSide& side : arrangement.SidesOf(tile)) {
+      ++count[side.colour][static_cast<size_t>(side.sign)];
+    }
+  }
+  int pairs = 0;
+  for (const auto& [colour, by_sign] : count) {
+    pairs += by_sign[0] * by_sign[1];
+  }
+  return pairs;
+}
 
 SynthesisParams SmallParams() {
   SynthesisParams params;
@@ -55,7 +75,7 @@ TEST(IndexMapsTest, EveryLegalPairOfPlane16AgreesAndNothingIsTurned) {
   const Arrangement& arrangement = **FindArrangement("plane-16");
   const Strip& strip = maps.strips[2];  // vertical, colour 0
   for (int tile = 0; tile < 16; ++tile) {
-    const TileSides sides = SidesFromTileCode(arrangement.codes[tile]);
+    const TileSides sides = arrangement.SidesOf(tile);
     for (int y = 1; y + 1 < 16; ++y) {
       // Upright picture: column c, row r is the lying strip at x = w - 1 - r, y = c.
       if (sides[1].colour == 0) {
@@ -68,12 +88,70 @@ TEST(IndexMapsTest, EveryLegalPairOfPlane16AgreesAndNothingIsTurned) {
   }
 }
 
+TEST(IndexMapsTest, EveryLegalPairOfSurface26AgreesTurnedAsDressingsTurnThem) {
+  const Exemplar exemplar(BumpyEmbedding(40, 36, 8));
+  IndexMaps maps = Synthesize(exemplar, "surface-26", SmallParams(), 0);
+  EXPECT_EQ(CheckAllPairs(maps, **FindArrangement("surface-26")), NumLegalPairs("surface-26"));
+  maps.texels = Surface96FromSurface26(maps.texels, maps.tile_size);
+  EXPECT_EQ(CheckAllPairs(maps, **FindArrangement("surface-96")), 2 * 96 * 96);
+}
+
+TEST(IndexMapsTest, EveryLegalPairOfPlane81AgreesAndNothingIsTurned) {
+  const Exemplar exemplar(BumpyEmbedding(36, 40, 9));
+  const IndexMaps maps = Synthesize(exemplar, "plane-81", SmallParams(), 0);
+  EXPECT_EQ(maps.strips.size(), 6u);
+  EXPECT_EQ(CheckAllPairs(maps, **FindArrangement("plane-81")), 2 * 3 * 27 * 27);
+  EXPECT_TRUE(std::ranges::all_of(maps.texels, [](uint32_t texel) { return TurnsOfTexel(texel) == 0; }));
+}
+
+// Walks every edge of a dressed mesh: on either side lies its half of one strip, row against row.
+void ExpectMatchedEdges(const IndexMaps& maps, const Arrangement& arrangement, const QuadMesh& mesh) {
+  const absl::StatusOr<DressResult> dressed = DressMesh(mesh, arrangement, {}, RunContext{});
+  ASSERT_TRUE(dressed.ok()) << dressed.status();
+  const Dressing& dressing = dressed->dressing;
+  const auto neighbours = *BuildTileNeighbours(dressing);
+  const int size = maps.tile_size;
+  const auto texel_on = [&](int face, int side, int position) {
+    const auto [x, y] = TexelOnSide(side, position, 0, size);
+    return maps.texel(static_cast<int>(dressing.tile[face]), x, y);
+  };
+  for (int face = 0; face < static_cast<int>(neighbours.size()); ++face) {
+    const TileSides sides = arrangement.SidesOf(dressing.tile[face]);
+    for (int side = 0; side < 4; ++side) {
+      const TileNeighbour& across = neighbours[face][side];
+      if (across.face < 0 || sides[side].sign != Sign::kPlus) {
+        continue;
+      }
+      const Strip& strip = maps.strips[StripOfSide(arrangement, side, sides[side].colour)];
+      for (int x = 1; x + 1 < size; ++x) {
+        const uint32_t here = texel_on(face, side, x);
+        const uint32_t there = TurnTexel(texel_on(across.face, across.side, size - 1 - x), across.turns);
+        ASSERT_EQ(here, TurnTexel(strip.texel(x, strip.height / 2 - 1), side)) << face << " " << side;
+        ASSERT_EQ(there, TurnTexel(strip.texel(x, strip.height / 2), side)) << face << " " << side;
+      }
+    }
+  }
+}
+
+TEST(IndexMapsTest, DressedMeshesMatchAcrossEveryEdge) {
+  const Exemplar exemplar(BumpyEmbedding(36, 36, 12));
+  const Arrangement& surface = **FindArrangement("surface-26");
+  const IndexMaps turned = Synthesize(exemplar, "surface-26", SmallParams(), 0);
+  for (const std::string_view shape : BuiltinShapeNames()) {
+    ExpectMatchedEdges(turned, surface, *BuiltinShape(shape));
+  }
+  const IndexMaps unturned = Synthesize(exemplar, "plane-81", SmallParams(), 0);
+  for (const char* const shape : {"plane", "torus"}) {
+    ExpectMatchedEdges(unturned, **FindArrangement("plane-81"), *BuiltinShape(shape));
+  }
+}
+
 TEST(IndexMapsTest, CornerTexelsBelongToTheSideThatStartsThere) {
   const Exemplar exemplar(BumpyEmbedding(40, 40, 3));
   const IndexMaps maps = Synthesize(exemplar, "surface-96", SmallParams(), 0);
   const Arrangement& arrangement = **FindArrangement("surface-96");
   for (int tile = 0; tile < 96; ++tile) {
-    const TileSides sides = SidesFromTileCode(arrangement.codes[tile]);
+    const TileSides sides = arrangement.SidesOf(tile);
     for (int side = 0; side < 4; ++side) {
       const auto [x, y] = TilePixelAt(side, 0, 0, 16);
       const StripTexel at = StripTexelAt(side, sides[side].sign, 0, 0, 16, 8);
@@ -119,6 +197,32 @@ TEST(IndexMapsTest, NoTwoTilesShowTheSameInside) {
     }
     EXPECT_EQ(num_alike, 0) << "of 120 pairs have more than 30% in common, seed " << seed;
   }
+}
+
+TEST(IndexMapsTest, NoTileLaidTurnedShowsTheInsideOfAnother) {
+  constexpr int kTile = 32;
+  constexpr int kMargin = 4;
+  constexpr int kInside = (kTile - 2 * kMargin) * (kTile - 2 * kMargin);
+  const Exemplar exemplar(BumpyEmbedding(64, 64, 13));
+  SynthesisParams params = SmallParams();
+  params.tile_size = kTile;
+  const IndexMaps maps = Synthesize(exemplar, "surface-26", params, 0);
+  int num_alike = 0;
+  for (int turns = 0; turns < 4; ++turns) {
+    for (int a = 0; a < 26; ++a) {
+      const std::vector<uint32_t> turned = TurnedTile(maps, a, turns);
+      for (int b = 0; b < a; ++b) {
+        int same = 0;
+        for (int y = kMargin; y < kTile - kMargin; ++y) {
+          for (int x = kMargin; x < kTile - kMargin; ++x) {
+            same += turned[y * kTile + x] == maps.texel(b, x, y) ? 1 : 0;
+          }
+        }
+        num_alike += same > 0.3 * kInside ? 1 : 0;
+      }
+    }
+  }
+  EXPECT_EQ(num_alike, 0) << "of 1,300 pairs have more than 30% in common";
 }
 
 TEST(IndexMapsTest, TakesAnyEvenStripAndAnyTileOfTwiceIt) {

@@ -2,34 +2,20 @@
 #pragma once
 
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include <gtest/gtest.h>
 
 #include "btf/tiles/index_maps.h"
 #include "btf/tiles/tile_sides.h"
+#include "tests/btf/wang/turned_tiles.h"
 
 namespace tessera {
 
-// A tile as a picture, turned as numpy.rot90 does: texels move and take the turns on.
 inline std::vector<uint32_t> TurnedTile(const IndexMaps& maps, int tile, int turns) {
-  const int size = maps.tile_size;
-  std::vector<uint32_t> picture(static_cast<size_t>(size) * size);
-  for (int y = 0; y < size; ++y) {
-    for (int x = 0; x < size; ++x) {
-      picture[y * size + x] = maps.texel(tile, x, y);
-    }
-  }
-  for (int i = 0; i < (turns & 3); ++i) {
-    std::vector<uint32_t> turned(picture.size());
-    for (int y = 0; y < size; ++y) {
-      for (int x = 0; x < size; ++x) {
-        turned[(size - 1 - x) * size + y] = TurnTexel(picture[y * size + x], 1);
-      }
-    }
-    picture.swap(turned);
-  }
-  return picture;
+  const size_t area = static_cast<size_t>(maps.tile_size) * maps.tile_size;
+  return TurnedTexels(std::span(maps.texels).subspan(tile * area, area), maps.tile_size, turns);
 }
 
 // Lays '+' side k of A on top of '-' side j of B, turned so that the shared side lies level with A above it,
@@ -55,9 +41,9 @@ inline int CheckAllPairs(const IndexMaps& maps, const Arrangement& arrangement) 
   int num_pairs = 0;
   const int num_tiles = static_cast<int>(arrangement.codes.size());
   for (int a = 0; a < num_tiles; ++a) {
-    const TileSides sides_a = SidesFromTileCode(arrangement.codes[a]);
+    const TileSides sides_a = arrangement.SidesOf(a);
     for (int b = 0; b < num_tiles; ++b) {
-      const TileSides sides_b = SidesFromTileCode(arrangement.codes[b]);
+      const TileSides sides_b = arrangement.SidesOf(b);
       for (int k = 0; k < 4; ++k) {
         for (int j = 0; j < 4; ++j) {
           const bool opposite = sides_a[k].sign == Sign::kPlus && sides_b[j].sign == Sign::kMinus;

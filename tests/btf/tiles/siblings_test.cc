@@ -1,11 +1,14 @@
 #include "btf/tiles/siblings.h"
 
 #include <algorithm>
+#include <span>
+#include <utility>
 #include <vector>
 
 #include <gtest/gtest.h>
 
 #include "tests/btf/tiles/noise_exemplar.h"
+#include "tests/btf/wang/turned_tiles.h"
 
 namespace tessera {
 namespace {
@@ -40,7 +43,7 @@ PatchCut TakingFirst(int num_texels) {
 TEST(SiblingsTest, RepeatsWhenMoreThanAShareOfTheWindowIsASiblingsInPlace) {
   const Exemplar exemplar(BumpyEmbedding(32, 32, 1));
   const std::vector<uint32_t> texels = Tiles(exemplar);
-  const Siblings siblings(texels, kSize, kMargin, 0);
+  const Siblings siblings(texels, kSize, kMargin, 0, {0});
   EXPECT_FALSE(siblings.Repeats(exemplar, kWindow, kPatch, TakingFirst(15)));
   EXPECT_TRUE(siblings.Repeats(exemplar, kWindow, kPatch, TakingFirst(16)));
 }
@@ -48,10 +51,26 @@ TEST(SiblingsTest, RepeatsWhenMoreThanAShareOfTheWindowIsASiblingsInPlace) {
 TEST(SiblingsTest, IsNotItsOwnSiblingAndMayShowTheSameElsewhere) {
   const Exemplar exemplar(BumpyEmbedding(32, 32, 2));
   const std::vector<uint32_t> texels = Tiles(exemplar);
-  EXPECT_FALSE(Siblings(texels, kSize, kMargin, 1).Repeats(exemplar, kWindow, kPatch, TakingFirst(100)));
-  EXPECT_TRUE(Siblings(texels, kSize, kMargin, 2).Repeats(exemplar, kWindow, kPatch, TakingFirst(100)));
+  EXPECT_FALSE(Siblings(texels, kSize, kMargin, 1, {0}).Repeats(exemplar, kWindow, kPatch, TakingFirst(100)));
+  EXPECT_TRUE(Siblings(texels, kSize, kMargin, 2, {0}).Repeats(exemplar, kWindow, kPatch, TakingFirst(100)));
   const Patch turned = {2, kPatch.u, kPatch.v};
-  EXPECT_FALSE(Siblings(texels, kSize, kMargin, 0).Repeats(exemplar, kWindow, turned, TakingFirst(100)));
+  EXPECT_FALSE(Siblings(texels, kSize, kMargin, 0, {0}).Repeats(exemplar, kWindow, turned, TakingFirst(100)));
+}
+
+TEST(SiblingsTest, SeesASiblingLaidTurned) {
+  const Exemplar exemplar(BumpyEmbedding(32, 32, 4));
+  std::vector<uint32_t> texels = Tiles(exemplar);
+  constexpr size_t kArea = kSize * kSize;
+  // Laid with a quarter turn, tile 1 looks as it did before.
+  const std::vector<uint32_t> turned_back = TurnedTexels(std::span(texels).subspan(kArea, kArea), kSize, 3);
+  std::ranges::copy(turned_back, texels.begin() + kArea);
+  const auto repeats = [&](std::vector<int> turns) {
+    return Siblings(texels, kSize, kMargin, 0, std::move(turns))
+        .Repeats(exemplar, kWindow, kPatch, TakingFirst(100));
+  };
+  EXPECT_FALSE(repeats({0}));
+  EXPECT_TRUE(repeats({0, 1}));
+  EXPECT_FALSE(repeats({0, 2, 3}));
 }
 
 TEST(SiblingsTest, LooksAtTheInsideOnly) {
@@ -59,8 +78,8 @@ TEST(SiblingsTest, LooksAtTheInsideOnly) {
   const std::vector<uint32_t> texels = Tiles(exemplar);
   // 10 x 1 texels of the window's first rows lie within a margin of 4, 10 x 9 do not; the first two columns
   // do.
-  EXPECT_FALSE(Siblings(texels, kSize, 4, 0).Repeats(exemplar, kWindow, kPatch, TakingFirst(20)));
-  EXPECT_TRUE(Siblings(texels, kSize, 4, 0).Repeats(exemplar, kWindow, kPatch, TakingFirst(30)));
+  EXPECT_FALSE(Siblings(texels, kSize, 4, 0, {0}).Repeats(exemplar, kWindow, kPatch, TakingFirst(20)));
+  EXPECT_TRUE(Siblings(texels, kSize, 4, 0, {0}).Repeats(exemplar, kWindow, kPatch, TakingFirst(30)));
 }
 
 }  // namespace

@@ -4,6 +4,7 @@
 #include <array>
 #include <map>
 #include <numeric>
+#include <set>
 #include <string>
 
 #include <gmock/gmock.h>
@@ -27,7 +28,7 @@ DressResult Dress(const QuadMesh& mesh, std::string_view arrangement, const Dres
 
 // What a side of a face shows, straight from the definition: tile side j lies on face side (j + turns) mod 4.
 std::map<int, TileSide> ShownSides(const Dressing& dressing, const Arrangement& arrangement, size_t face) {
-  const TileSides tile = SidesFromTileCode(arrangement.codes.at(dressing.tile.at(face)));
+  const TileSides tile = arrangement.SidesOf(dressing.tile.at(face));
   std::map<int, TileSide> shown;
   for (int j = 0; j < 4; ++j) {
     shown[(j + dressing.turns.at(face)) % 4] = tile[j];
@@ -72,6 +73,29 @@ TEST(DressMeshTest, EveryShapeHasLegalNeighboursOnASurfaceArrangement) {
   }
 }
 
+// The colours and signs depend on mesh and seed alone, so surface-26 shows what surface-96 shows.
+TEST(DressMeshTest, Surface26ShowsEverySideThatSurface96Shows) {
+  const Arrangement& few = **FindArrangement("surface-26");
+  const Arrangement& all = **FindArrangement("surface-96");
+  const auto expect_same_sides = [&](const QuadMesh& mesh, const DressParams& params) {
+    const DressResult result = Dress(mesh, "surface-26", params);
+    EXPECT_TRUE(result.breaks.empty());
+    ExpectLegal(result.dressing, few);
+    const Dressing whole = Dress(mesh, "surface-96", params).dressing;
+    for (size_t face = 0; face < whole.tile.size(); ++face) {
+      EXPECT_EQ(ShownSides(result.dressing, few, face), ShownSides(whole, all, face));
+    }
+    return std::set<uint8_t>(result.dressing.turns.begin(), result.dressing.turns.end());
+  };
+  for (const std::string_view shape : BuiltinShapeNames()) {
+    EXPECT_EQ(expect_same_sides(*BuiltinShape(shape), {}).size(), 4u) << "tiles in every turn";
+  }
+  for (uint64_t seed = 0; seed < 20; ++seed) {
+    expect_same_sides(RandomPolycube(seed), {.seed = seed, .target_quads = 1});
+  }
+  expect_same_sides(Strip(9, 3, Closing::kBand), {});
+}
+
 TEST(DressMeshTest, OpenAndClosedAndRandomMeshesHaveLegalNeighbours) {
   ExpectLegal(Dress(Cube(), "surface-96", {.target_quads = 6}).dressing, **FindArrangement("surface-96"));
   ExpectLegal(Dress(Strip(1, 1, Closing::kOpen), "surface-96", {.target_quads = 1}).dressing,
@@ -87,20 +111,27 @@ TEST(DressMeshTest, OpenAndClosedAndRandomMeshesHaveLegalNeighbours) {
   }
 }
 
-TEST(DressMeshTest, UsesAllTilesAboutEquallyOften) {
-  const DressResult result = Dress(*BuiltinShape("torus"), "surface-96", {.target_quads = 19200});
-  std::vector<double> counts(96, 0.0);
-  for (const uint32_t tile : result.dressing.tile) {
+// Of the tiles' counts against equal ones.
+double ChiSquareOfTiles(const Dressing& dressing, size_t num_tiles) {
+  std::vector<double> counts(num_tiles, 0.0);
+  for (const uint32_t tile : dressing.tile) {
     ++counts[tile];
   }
-  const double expected = static_cast<double>(result.dressing.tile.size()) / 96.0;
+  const double expected = static_cast<double>(dressing.tile.size()) / static_cast<double>(num_tiles);
   double chi_square = 0.0;
   for (const double count : counts) {
     chi_square += (count - expected) * (count - expected) / expected;
   }
+  return chi_square;
+}
+
+TEST(DressMeshTest, UsesAllTilesAboutEquallyOften) {
+  const DressResult result = Dress(*BuiltinShape("torus"), "surface-96", {.target_quads = 19200});
   // Tiles of neighbours are not independent, so this is a bound on the spread and no test of chance: four
-  // times the 99.9% quantile at 95 degrees of freedom.
-  EXPECT_LT(chi_square, 4 * 143.3);
+  // times the 99.9% quantile at 95 and 80 degrees of freedom.
+  EXPECT_LT(ChiSquareOfTiles(result.dressing, 96), 4 * 143.3);
+  const DressResult plane = Dress(*BuiltinShape("torus"), "plane-81", {.target_quads = 19200});
+  EXPECT_LT(ChiSquareOfTiles(plane.dressing, 81), 4 * 124.8);
 }
 
 TEST(DressMeshTest, SameSeedSameDressingAndAnotherSeedAnother) {
@@ -123,13 +154,24 @@ TEST(DressMeshTest, ADressingIsTheSameOnEveryMachineAndInEveryVersion) {
               testing::ElementsAre(30, 35, 79, 34, 85, 13, 9, 50));
   EXPECT_THAT(std::vector<uint32_t>(plane.tile.begin(), plane.tile.begin() + 8),
               testing::ElementsAre(14, 11, 11, 10, 13, 1, 1, 2));
+  const Dressing turned = Dress(*BuiltinShape("plane"), "surface-26").dressing;
+  const Dressing three_colours = Dress(*BuiltinShape("plane"), "plane-81").dressing;
+  EXPECT_THAT(std::vector<uint32_t>(turned.tile.begin(), turned.tile.begin() + 8),
+              testing::ElementsAre(21, 24, 16, 23, 24, 12, 9, 4));
+  EXPECT_THAT(std::vector<uint8_t>(turned.turns.begin(), turned.turns.begin() + 8),
+              testing::ElementsAre(0, 0, 3, 0, 3, 0, 0, 3));
+  EXPECT_THAT(std::vector<uint32_t>(three_colours.tile.begin(), three_colours.tile.begin() + 8),
+              testing::ElementsAre(56, 7, 73, 17, 78, 59, 49, 46));
 }
 
-TEST(DressMeshTest, PlaneAndTorusTakePlane16WithoutBreaks) {
-  for (const std::string_view shape : {"plane", "torus"}) {
-    const DressResult result = Dress(*BuiltinShape(shape), "plane-16", {.target_quads = 1000});
+using ShapeAndArrangement = std::pair<const char*, const char*>;
+
+TEST(DressMeshTest, PlaneAndTorusTakePlanesWithoutBreaks) {
+  for (const auto& [shape, id] : std::vector<ShapeAndArrangement>{
+           {"plane", "plane-16"}, {"torus", "plane-16"}, {"torus", "plane-81"}}) {
+    const DressResult result = Dress(*BuiltinShape(shape), id, {.target_quads = 1000});
     EXPECT_TRUE(result.breaks.empty());
-    ExpectLegal(result.dressing, **FindArrangement("plane-16"));
+    ExpectLegal(result.dressing, **FindArrangement(id));
     const auto neighbours = BuildTileNeighbours(result.dressing);
     for (const auto& sides : *neighbours) {
       for (const TileNeighbour& across : sides) {
@@ -197,10 +239,10 @@ TEST(DressMeshTest, StopsWhenAskedTo) {
 TEST(FindBreaksTest, NoticesAWrongTile) {
   Dressing dressing = Dress(*BuiltinShape("torus"), "surface-96").dressing;
   EXPECT_TRUE(FindBreaks(dressing, **FindArrangement("surface-96"))->empty());
-  const TileSides sides = SidesFromTileCode((*FindArrangement("surface-96"))->codes[dressing.tile[7]]);
+  const TileSides sides = (*FindArrangement("surface-96"))->SidesOf(dressing.tile[7]);
   TileSides wrong = sides;
   wrong[1].colour ^= 1;
-  dressing.tile[7] = static_cast<uint32_t>((*FindArrangement("surface-96"))->IndexOfCode(TileCode(wrong)));
+  dressing.tile[7] = static_cast<uint32_t>((*FindArrangement("surface-96"))->IndexOfCode(TileCode(wrong, 2)));
   EXPECT_EQ(FindBreaks(dressing, **FindArrangement("surface-96"))->size(), 1u);
   dressing.tile[7] = 96;
   EXPECT_EQ(FindBreaks(dressing, **FindArrangement("surface-96")).status().code(),

@@ -16,7 +16,7 @@ Dressing Dressed(std::string_view arrangement) {
 }
 
 TEST(RedressTest, EveryQuadShowsItsTileOfAnySetOfTheArrangement) {
-  for (const char* id : {"plane-16", "surface-96"}) {
+  for (const char* id : {"plane-16", "plane-81", "surface-26", "surface-96"}) {
     const Dressing dressing = Dressed(id);
     for (const uint64_t material : {1u, 2u}) {
       const TileSet tile_set = SmallTileSet(id, material);

@@ -49,7 +49,7 @@ void Poke(Container& container, std::string_view name, size_t element, T value) 
 }
 
 TEST(TileSetTest, RoundTripKeepsEverything) {
-  for (const char* id : {"plane-16", "surface-96"}) {
+  for (const char* id : {"plane-16", "plane-81", "surface-26", "surface-96"}) {
     const TileSet before = SmallTileSet(id);
     const auto bytes = SerializeTileSet(before);
     ASSERT_TRUE(bytes.ok()) << bytes.status();
