@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstdlib>
 #include <vector>
 
 #include <Eigen/Core>
@@ -13,89 +12,95 @@
 namespace tessera {
 namespace {
 
-// One turn of the exemplar as a picture: rows of points about their mean.
-struct Picture {
+constexpr double kSmallestDistance = 0.01;  // of the exemplar's spread
+constexpr int kOffsetsAtOnce = 256;         // columns of a product: what threads share
+
+// A rectangle of the unturned exemplar.
+struct Crop {
+  int x = 0;
+  int y = 0;
   int width = 0;
   int height = 0;
-  Eigen::VectorXd mean;
-  Eigen::MatrixXf points;  // [dims][height * width]
 };
 
-Picture TurnedPicture(const Exemplar& exemplar, int turn) {
-  Picture picture{
-      .width = exemplar.TurnedWidth(turn), .height = exemplar.TurnedHeight(turn), .mean = {}, .points = {}};
-  picture.points.resize(exemplar.search_dims(), exemplar.num_pixels());
-  for (int v = 0; v < picture.height; ++v) {
-    for (int u = 0; u < picture.width; ++u) {
-      picture.points.col(v * picture.width + u) = Eigen::Map<const Eigen::VectorXf>(
-          exemplar.Point(exemplar.TexelAt(turn, u, v)), exemplar.search_dims());
+// The patches of a crop, a column each, `step` texels apart, seen after `turn` quarter turns.
+Eigen::MatrixXf PatchesOf(const Exemplar& exemplar, const Crop& crop, int turn, int step) {
+  const int dims = exemplar.search_dims();
+  const int across = (crop.width - kAnisotropyPatch) / step + 1;
+  const int down = (crop.height - kAnisotropyPatch) / step + 1;
+  Eigen::MatrixXf patches(kAnisotropyPatch * kAnisotropyPatch * dims, across * down);
+  for (int place = 0; place < across * down; ++place) {
+    float* value = patches.col(place).data();
+    const int left = crop.x + place % across * step;
+    const int top = crop.y + place / across * step;
+    for (int v = 0; v < kAnisotropyPatch; ++v) {
+      for (int u = 0; u < kAnisotropyPatch; ++u) {
+        // Where the patch turned counter-clockwise takes this texel from.
+        int x = u;
+        int y = v;
+        for (int i = 0; i < turn; ++i) {
+          const int turned_x = kAnisotropyPatch - 1 - y;
+          y = x;
+          x = turned_x;
+        }
+        const auto pixel = static_cast<uint32_t>((top + y) * exemplar.width() + left + x);
+        value = std::copy_n(exemplar.Point(PackTexel(pixel, turn)), dims, value);
+      }
     }
   }
-  picture.mean = picture.points.cast<double>().rowwise().mean();
-  picture.points.colwise() -= picture.mean.cast<float>();
-  return picture;
+  return patches;
 }
 
-// Means over texels p of (point at p) (point at p + d)^T, p in the upper and in the lower half of the
-// picture.
-std::array<Eigen::MatrixXd, 2> CrossCovariances(const Picture& picture, int dx, int dy) {
-  const auto dims = picture.points.rows();
-  std::array<Eigen::MatrixXd, 2> halves;
-  const int x0 = std::max(0, -dx);
-  const int width = picture.width - std::abs(dx);
-  const int height = picture.height - dy;
-  const std::array<int, 3> bounds = {0, height / 2, height};
-  for (int half = 0; half < 2; ++half) {
-    halves[half] = Eigen::MatrixXd::Zero(dims, dims);
-    for (int y = bounds[half]; y < bounds[half + 1]; ++y) {
-      halves[half] += (picture.points.middleCols(y * picture.width + x0, width) *
-                       picture.points.middleCols((y + dy) * picture.width + x0 + dx, width).transpose())
-                          .cast<double>();
-    }
-    halves[half] /= static_cast<double>(width) * (bounds[half + 1] - bounds[half]);
+// Mean over the columns of `wanted` of the distance to the nearest column of `offered`.
+double MeanNearest(const Eigen::MatrixXf& wanted, const Eigen::MatrixXf& offered, double least,
+                   const RunContext& context) {
+  const Eigen::RowVectorXf offered_squares = offered.colwise().squaredNorm();
+  const Eigen::Index num_parts = (offered.cols() + kOffsetsAtOnce - 1) / kOffsetsAtOnce;
+  // Of each wanted patch in each part, the squared distance less the patch's own square.
+  Eigen::MatrixXf nearest = Eigen::MatrixXf::Zero(wanted.cols(), num_parts);
+  ParallelFor(context, 0, num_parts, 1, [&](int64_t part, int64_t) {
+    const Eigen::Index first = part * kOffsetsAtOnce;
+    const Eigen::Index count = std::min<Eigen::Index>(kOffsetsAtOnce, offered.cols() - first);
+    Eigen::MatrixXf distances = -2.0f * (wanted.transpose() * offered.middleCols(first, count));
+    distances.rowwise() += offered_squares.segment(first, count);
+    nearest.col(part) = distances.rowwise().minCoeff();
+  });
+  double sum = 0.0;
+  for (Eigen::Index patch = 0; patch < wanted.cols(); ++patch) {
+    const double square = wanted.col(patch).squaredNorm() + nearest.row(patch).minCoeff();
+    sum += std::max(least, std::sqrt(std::max(0.0, square)));
   }
-  return halves;
+  return sum / static_cast<double>(wanted.cols());
 }
 
 }  // namespace
 
-Anisotropy MeasureAnisotropy(const Exemplar& exemplar, const RunContext& context) {
-  const std::array<Picture, 2> pictures = {TurnedPicture(exemplar, 0), TurnedPicture(exemplar, 1)};
-  // C(-d) = C(d)^T: half of the offsets tell all.
-  std::vector<std::array<int, 2>> offsets;
-  for (int dy = 0; dy <= kAnisotropyRadius; ++dy) {
-    for (int dx = dy == 0 ? 0 : -kAnisotropyRadius; dx <= kAnisotropyRadius; ++dx) {
-      offsets.push_back({dx, dy});
+double MeasureAnisotropy(const Exemplar& exemplar, const RunContext& context) {
+  const int width = std::min(exemplar.width(), kAnisotropySide);
+  const int height = std::min(exemplar.height(), kAnisotropySide);
+  if (width < 2 * kAnisotropyPatch || height < 2 * kAnisotropyPatch) {
+    return 1.0;
+  }
+  const int left = (exemplar.width() - width) / 2;
+  const int top = (exemplar.height() - height) / 2;
+  const std::array<std::array<Crop, 2>, 2> splits = {
+      {{{{left, top, width / 2, height}, {left + width / 2, top, width - width / 2, height}}},
+       {{{left, top, width, height / 2}, {left, top + height / 2, width, height - height / 2}}}}};
+  const double least = kSmallestDistance * std::sqrt(exemplar.search_spread()) * kAnisotropyPatch;
+  double unturned = 0.0;
+  double turned = 0.0;
+  for (const auto& halves : splits) {
+    for (int half = 0; half < 2; ++half) {
+      const Eigen::MatrixXf offered = PatchesOf(exemplar, halves[1 - half], 0, 1);
+      const auto mean_nearest = [&](int turn) {
+        return MeanNearest(PatchesOf(exemplar, halves[half], turn, kAnisotropyPatch), offered, least,
+                           context);
+      };
+      unturned += mean_nearest(0);
+      turned += (mean_nearest(1) + mean_nearest(3)) / 2.0;
     }
   }
-  std::vector<double> differences(offsets.size(), 0.0);
-  std::vector<double> squares(offsets.size(), 0.0);
-  ParallelFor(context, 0, static_cast<int64_t>(offsets.size()), 8, [&](int64_t begin, int64_t end) {
-    for (int64_t i = begin; i < end; ++i) {
-      const auto [unturned_a, unturned_b] = CrossCovariances(pictures[0], offsets[i][0], offsets[i][1]);
-      const auto [turned_a, turned_b] = CrossCovariances(pictures[1], offsets[i][0], offsets[i][1]);
-      const Eigen::MatrixXd unturned = (unturned_a + unturned_b) / 2.0;
-      const Eigen::MatrixXd turned = (turned_a + turned_b) / 2.0;
-      // Halves of one picture differ by chance alone, in the mean square by twice what two whole pictures do.
-      const double chance =
-          ((unturned_a - unturned_b).squaredNorm() + (turned_a - turned_b).squaredNorm()) / 4.0;
-      differences[i] = (unturned - turned).squaredNorm() - chance;
-      squares[i] = unturned.squaredNorm() + turned.squaredNorm();
-    }
-  });
-  Anisotropy anisotropy;
-  double difference = 0.0;
-  double square = 0.0;
-  for (size_t i = 0; i < offsets.size(); ++i) {
-    difference += differences[i];
-    square += squares[i];
-  }
-  anisotropy.pattern = square > 0.0 ? std::sqrt(std::max(0.0, difference) / square) : 0.0;
-  const double mean_difference = (pictures[0].mean - pictures[1].mean).squaredNorm();
-  const double variance =
-      (pictures[0].points.squaredNorm() + pictures[1].points.squaredNorm()) / (2.0 * exemplar.num_pixels());
-  anisotropy.mean = mean_difference > 0.0 ? std::sqrt(mean_difference / (mean_difference + variance)) : 0.0;
-  return anisotropy;
+  return unturned > 0.0 ? turned / unturned : 1.0;
 }
 
 }  // namespace tessera

@@ -12,11 +12,11 @@
 #include "btf/tiles/diamonds.h"
 #include "btf/tiles/frames.h"
 #include "btf/tiles/interior.h"
+#include "btf/tiles/pattern.h"
 
 namespace tessera {
 namespace {
 
-constexpr int kSmallestStrip = 8;
 constexpr int kSmallestExemplar = 32;
 // The BTFel number of a packed texel has 30 bits; tiles of 16,384 texels are far beyond any use.
 constexpr int kLargestTile = 16384;

@@ -1,6 +1,7 @@
 #include "btf/tiles/synthesize.h"
 
 #include <algorithm>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -14,6 +15,7 @@
 #include "btf/tiles/anisotropy.h"
 #include "btf/tiles/certificate.h"
 #include "btf/tiles/index_maps.h"
+#include "btf/tiles/pattern.h"
 
 namespace tessera {
 namespace {
@@ -95,6 +97,76 @@ nlohmann::json DescribeReports(const IndexMaps& maps) {
   return {{"strips", summary(strips)}, {"tiles", summary(tiles)}, {"thresholds_reached", reached}};
 }
 
+// What CheckSizes can be asked before the sizes that are 0 have been chosen.
+SynthesisParams SmallestSizes(SynthesisParams params) {
+  params.strip_height = params.strip_height == 0 ? kSmallestStrip : params.strip_height;
+  params.tile_size = params.tile_size == 0 ? 2 * params.strip_height : params.tile_size;
+  return params;
+}
+
+SynthesisParams ChosenSizes(const Material& material, const Arrangement& arrangement,
+                            const MaterialPattern& pattern, SynthesisParams params) {
+  if (params.tile_size == 0) {
+    params.tile_size = TileSizeFor(pattern, params.strip_height,
+                                   !arrangement.turned_strips && params.method == SynthesisMethod::kFrame);
+  }
+  if (params.strip_height == 0) {
+    params.strip_height = StripHeightFor(pattern, material.width, material.height, params.tile_size);
+  }
+  return params;
+}
+
+// "(7.1, 7.1) and (-7.1, 7.1)".
+std::string PeriodText(const Period& period) {
+  std::vector<std::string> vectors;
+  for (const PeriodVector& vector : period.vectors) {
+    vectors.push_back(absl::StrFormat("(%.1f, %.1f)", vector[0], vector[1]));
+  }
+  return absl::StrJoin(vectors, " and ");
+}
+
+// Why each size that was 0 was chosen.
+std::vector<std::string> SizeNotes(const MaterialPattern& pattern, const SynthesisParams& asked,
+                                   const SynthesisParams& chosen) {
+  std::vector<std::string> notes;
+  if (asked.tile_size == 0 && pattern.period &&
+      PeriodSlip(*pattern.period, chosen.tile_size) <= LargestSlip(*pattern.period)) {
+    notes.push_back(absl::StrFormat("tile %d: in step with the material's period of %s texels",
+                                    chosen.tile_size, PeriodText(*pattern.period)));
+  }
+  if (asked.strip_height == 0) {
+    const bool limited = chosen.strip_height < pattern.feature_size - 1.0;
+    notes.push_back(
+        absl::StrFormat("strip %d: features of %.1f texels%s", chosen.strip_height, pattern.feature_size,
+                        limited ? "; at most half a tile and a tenth of the material's shorter side" : ""));
+  }
+  return notes;
+}
+
+// Why a regular material will not keep its period.
+std::vector<std::string> PeriodWarnings(const Arrangement& arrangement, const MaterialPattern& pattern,
+                                        const SynthesisParams& params) {
+  if (!pattern.period) {
+    return {};
+  }
+  const Period& period = *pattern.period;
+  const std::string repeats = absl::StrFormat("the material repeats every %s texels", PeriodText(period));
+  if (arrangement.turned_strips) {
+    return {absl::StrFormat("%s: the turned strips of %s cannot be relied on to keep step; take plane-16",
+                            repeats, arrangement.id)};
+  }
+  const double slip = PeriodSlip(period, params.tile_size);
+  if (slip <= LargestSlip(period)) {
+    return {};
+  }
+  const std::optional<int> in_step =
+      TileSizeInStep(period, params.tile_size, 2 * kSmallestStrip, 4 * params.tile_size);
+  return {absl::StrFormat("%s: tiles of %d are out of step by %.1f texels (limit %.1f)%s", repeats,
+                          params.tile_size, slip, LargestSlip(period),
+                          in_step ? absl::StrFormat("; %d is the nearest size in step", *in_step)
+                                  : std::string("; no size near is in step"))};
+}
+
 }  // namespace
 
 std::string_view SynthesisMethodName(SynthesisMethod method) {
@@ -142,8 +214,8 @@ TileSet TileSetOfMaps(const Material& material, const Arrangement& arrangement, 
 }
 
 absl::StatusOr<TileSet> SynthesizeTileSet(const Material& material, const Arrangement& arrangement,
-                                          const SynthesisParams& params, const RunContext& context) {
-  TESSERA_RETURN_IF_ERROR(CheckSizes(material.width, material.height, params));
+                                          const SynthesisParams& asked, const RunContext& context) {
+  TESSERA_RETURN_IF_ERROR(CheckSizes(material.width, material.height, SmallestSizes(asked)));
   const size_t num_pixels = static_cast<size_t>(material.width) * material.height;
   if (material.btfels.size() != num_pixels) {
     return absl::InvalidArgumentError(absl::StrFormat(
@@ -158,18 +230,17 @@ absl::StatusOr<TileSet> SynthesizeTileSet(const Material& material, const Arrang
     return absl::InvalidArgumentError(absl::StrCat("unknown codec '", material.btfels.codec_id, "'"));
   }
   TESSERA_ASSIGN_OR_RETURN(const Embedding embedding, codec->Embed(material, kCutDims, context));
-  const Exemplar exemplar(embedding, params.seam_rule);
-  const Anisotropy anisotropy = MeasureAnisotropy(exemplar, context);
-  TESSERA_RETURN_IF_ERROR(context.CheckStop());
-  if (arrangement.turned_strips && anisotropy.figure() > kAnisotropyLimit && !params.force) {
+  const Exemplar exemplar(embedding, asked.seam_rule);
+  TESSERA_ASSIGN_OR_RETURN(const MaterialPattern pattern, MeasurePattern(exemplar, context));
+  if (arrangement.turned_strips && pattern.anisotropy > kAnisotropyLimit && !asked.force) {
     return WithReason(
-        absl::FailedPreconditionError(absl::StrFormat("material is not isotropic: anisotropy %.2f (pattern "
-                                                      "%.2f, mean reflectance %.2f), limit %.2f for "
-                                                      "'%s', whose strips are turned",
-                                                      anisotropy.figure(), anisotropy.pattern,
-                                                      anisotropy.mean, kAnisotropyLimit, arrangement.id)),
+        absl::FailedPreconditionError(absl::StrFormat(
+            "material is not isotropic: anisotropy %.2f (a turned patch is so many times as far from its "
+            "nearest like as an unturned one), limit %.2f for '%s', whose strips are turned",
+            pattern.anisotropy, kAnisotropyLimit, arrangement.id)),
         "NOT_ISOTROPIC");
   }
+  const SynthesisParams params = ChosenSizes(material, arrangement, pattern, asked);
 
   TESSERA_ASSIGN_OR_RETURN(const IndexMaps maps, SynthesizeIndexMaps(exemplar, arrangement, params, context));
 
@@ -195,10 +266,9 @@ absl::StatusOr<TileSet> SynthesizeTileSet(const Material& material, const Arrang
                                        {"search_share", CapturedShare(embedding, kSearchDims)},
                                        {"cut_dims", std::min(embedding.dims, kCutDims)},
                                        {"cut_share", CapturedShare(embedding, kCutDims)}};
-  set.metadata["anisotropy"] = {{"figure", anisotropy.figure()},
-                                {"pattern", anisotropy.pattern},
-                                {"mean", anisotropy.mean},
-                                {"limit", kAnisotropyLimit}};
+  set.metadata["pattern"] = DescribePattern(pattern);
+  set.metadata["notes"] = SizeNotes(pattern, asked, params);
+  set.metadata["warnings"] = PeriodWarnings(arrangement, pattern, params);
   const bool is_frame = params.method == SynthesisMethod::kFrame;
   if (!is_frame) {
     set.metadata["diamonds"] = {{"draws", maps.diamonds.num_draws},

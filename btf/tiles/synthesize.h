@@ -37,6 +37,7 @@ struct DiamondParams {
 };
 
 struct SynthesisParams {
+  // SynthesizeTileSet chooses what is 0 from the material, by TileSizeFor and StripHeightFor of pattern.h.
   int tile_size = 64;     // w, texels, at least 2 h; even for diamonds
   int strip_height = 16;  // h, texels, even, at least 8: about the size of a feature; overlap of diamonds
   uint64_t seed = 1;
@@ -58,8 +59,9 @@ struct SynthesisParams {
 
 // Every texel of the result is a BTFel of `material` with a turn (0 throughout for "plane-*"); the table
 // keeps the referenced BTFels in ascending exemplar order. Same material, arrangement and parameters give the
-// same bytes for any number of threads. Metadata: seed, method, parameters, anisotropy, captured variance,
-// thresholds and what was reached; certificate: see certificate.h.
+// same bytes for any number of threads. Metadata: seed, method, parameters, `pattern` (DescribePattern),
+// captured variance, thresholds and what was reached; `notes` and `warnings`, sentences: why a size was
+// chosen, and that tiles cannot keep a regular material's period. Certificate: see certificate.h.
 //
 // Errors, with reasons as in btf/base/reason.h: INVALID_ARGUMENT naming the size and its limit (reason
 // MATERIAL_TOO_SMALL when the exemplar is the cause) or an unknown codec; FAILED_PRECONDITION with reason

@@ -6,6 +6,7 @@
 
 #include "btf/base/status_macros.h"
 #include "btf/codec/material.h"
+#include "btf/tiles/pattern.h"
 #include "btf/tiles/synthesize.h"
 #include "btf/wang/arrangement.h"
 #include "btf/wang/tile_set.h"
@@ -17,20 +18,13 @@ namespace tessera {
 namespace {
 
 constexpr uint32_t kMaxTileSize = 1024;
-constexpr uint32_t kMinStripHeight = 8;
+constexpr uint32_t kMinStripHeight = kSmallestStrip;
 
 }  // namespace
 
 void FillDefaults(v1::SynthesizeTileSetRequest& request) {
-  const SynthesisParams defaults;
-  if (request.tile_size() == 0) {
-    request.set_tile_size(defaults.tile_size);
-  }
-  if (request.strip_height() == 0) {
-    request.set_strip_height(defaults.strip_height);
-  }
   if (request.method().empty()) {
-    request.set_method(std::string(SynthesisMethodName(defaults.method)));
+    request.set_method(std::string(SynthesisMethodName(SynthesisParams().method)));
   }
 }
 
@@ -44,18 +38,21 @@ absl::Status CheckSynthesizeRequest(const v1::SynthesizeTileSetRequest& request)
   if (!method.ok()) {
     return refuse(std::string(method.status().message()), "method");
   }
-  if (filled.strip_height() < kMinStripHeight || filled.strip_height() % 2 != 0) {
-    return refuse(absl::StrCat("strip_height ", filled.strip_height(),
-                               ", expected an even number of at least ", kMinStripHeight),
+  // What is 0 is chosen by the job, from the material.
+  const uint32_t strip_height = filled.strip_height() == 0 ? kMinStripHeight : filled.strip_height();
+  const uint64_t tile_size = filled.tile_size() == 0 ? 2 * uint64_t{strip_height} : filled.tile_size();
+  if (strip_height < kMinStripHeight || strip_height % 2 != 0) {
+    return refuse(absl::StrCat("strip_height ", strip_height, ", expected an even number of at least ",
+                               kMinStripHeight),
                   "strip_height");
   }
-  if (filled.tile_size() > kMaxTileSize || filled.tile_size() < 2 * uint64_t{filled.strip_height()}) {
-    return refuse(absl::StrCat("tile_size ", filled.tile_size(), ", expected twice the strip height (",
-                               2 * uint64_t{filled.strip_height()}, ") to ", kMaxTileSize),
+  if (tile_size > kMaxTileSize || tile_size < 2 * uint64_t{strip_height}) {
+    return refuse(absl::StrCat("tile_size ", tile_size, ", expected twice the strip height (",
+                               2 * uint64_t{strip_height}, ") to ", kMaxTileSize),
                   "tile_size");
   }
-  if (*method != SynthesisMethod::kFrame && filled.tile_size() % 2 != 0) {
-    return refuse(absl::StrCat("tile_size ", filled.tile_size(), ", expected an even number for method \"",
+  if (*method != SynthesisMethod::kFrame && tile_size % 2 != 0) {
+    return refuse(absl::StrCat("tile_size ", tile_size, ", expected an even number for method \"",
                                filled.method(), "\""),
                   "tile_size");
   }

@@ -37,7 +37,7 @@ TEST(WoolTilesTest, LiesInThePlaneAndIsNotTurned) {
   const absl::StatusOr<TileSet> set =
       SynthesizeTileSet(*wool, **FindArrangement("plane-16"), params, RunContext{});
   ASSERT_TRUE(set.ok()) << set.status();
-  const double anisotropy = set->metadata["anisotropy"]["figure"].get<double>();
+  const double anisotropy = set->metadata["pattern"]["anisotropy"].get<double>();
   EXPECT_GT(anisotropy, kAnisotropyLimit);
   EXPECT_THAT(std::string(turned.status().message()),
               HasSubstr(absl::StrFormat("not isotropic: anisotropy %.2f ", anisotropy)));

@@ -112,6 +112,8 @@ TEST_F(ServerTest, WrongArgumentsAreRefusedBeforeAnyJob) {
   synthesis.set_strip_height(7);
   EXPECT_EQ(synthesize(), "ARGUMENT_INVALID");
   synthesis.set_strip_height(40);
+  EXPECT_EQ(synthesize(), "NOT_FOUND") << "the tile size is chosen";
+  synthesis.set_tile_size(64);
   EXPECT_EQ(synthesize(), "ARGUMENT_INVALID");
   synthesis.set_strip_height(0);
   for (const char* const method : {"frame", "diamond-dp", "diamond-cut"}) {
