@@ -51,6 +51,12 @@ std::string CertificateText(const Json& certificate) {
                         Figure(certificate, "/repetition/plane_peak", "{:.2f}"),
                         Figure(certificate, "/repetition/exemplar_peak", "{:.2f}"));
   }
+  const std::string kept = Figure(certificate, "/repetition/period/kept", "{:.2f}");
+  if (!kept.empty()) {
+    text += fmt::format("\nperiod kept {} times as well as in the material (autocorrelation {} and {})", kept,
+                        Figure(certificate, "/repetition/period/plane", "{:.2f}"),
+                        Figure(certificate, "/repetition/period/exemplar", "{:.2f}"));
+  }
   return text;
 }
 
@@ -67,6 +73,13 @@ std::vector<std::string> CertificateWarnings(const Json& certificate) {
           "seams of the {} read {:.2f}, above the limit of {:.2f}: look at `tileset sheet --heat`", part,
           ratio, kSeamRatioLimit));
     }
+  }
+  const Json::json_pointer kept("/repetition/period/kept");
+  if (certificate.contains(kept) && certificate.at(kept).is_number() &&
+      certificate.at(kept).get<double>() < kPeriodKeptLimit) {
+    warnings.push_back(fmt::format(
+        "the material's period is lost: a plane of tiles keeps {:.2f} of it, below the limit of {:.2f}",
+        certificate.at(kept).get<double>(), kPeriodKeptLimit));
   }
   return warnings;
 }

@@ -12,11 +12,16 @@ namespace tessera::cli {
 // neighbours in the material itself do (ratio 1: the cut cannot be told from the material).
 inline constexpr double kSeamRatioLimit = 1.5;
 
+// Planes of tiles in which a regular material's period keeps less than this of its autocorrelation are out of
+// step: generated weave keeps 0.97 where tiles are in step and 0.36 where they are half a period off.
+inline constexpr double kPeriodKeptLimit = 0.8;
+
 // A table of seams beside what random cuts score, and lines on repetition and use of the material. Figures
 // that are missing are left out.
 [[nodiscard]] std::string CertificateText(const Json& certificate);
 
-// One sentence per part of the certificate (borders, insides) whose pooled ratio is above the limit.
+// One sentence per part of the certificate (borders, insides) whose pooled ratio is above the limit, and one
+// where the period is not kept.
 [[nodiscard]] std::vector<std::string> CertificateWarnings(const Json& certificate);
 
 }  // namespace tessera::cli

@@ -10,10 +10,12 @@
 #include "btf/choice/encode_model.h"
 #include "btf/data/import.h"
 #include "btf/image/image_io.h"
+#include "btf/tiles/pattern.h"
 #include "client/cli/arguments.h"
 #include "client/cli/commands.h"
 #include "client/cli/describe.h"
 #include "client/cli/exit_codes.h"
+#include "client/cli/pattern.h"
 #include "client/lib/flat_decode.h"
 #include "client/lib/names.h"
 #include "proto/wire/convert.h"
@@ -300,11 +302,26 @@ absl::Status ListMaterials(Session& session) {
   return absl::OkStatus();
 }
 
-absl::Status ShowMaterial(Session& session, const std::string& name) {
-  TESSERA_ASSIGN_OR_RETURN(const std::string full_name, FullMaterialName(name));
+struct ShowFlags {
+  std::string name;
+  bool pattern = false;
+};
+
+absl::Status ShowMaterial(Session& session, const ShowFlags& flags) {
+  TESSERA_ASSIGN_OR_RETURN(const std::string full_name, FullMaterialName(flags.name));
   TESSERA_ASSIGN_OR_RETURN(Client * client, session.Connect());
-  TESSERA_ASSIGN_OR_RETURN(const v1::Material material, client->GetMaterial(full_name, session.Context()));
-  session.Answer(Describe(material), TextRecord(Describe(material)));
+  const RunContext context = session.Context();
+  TESSERA_ASSIGN_OR_RETURN(const v1::Material material, client->GetMaterial(full_name, context));
+  Json described = Describe(material);
+  std::string text = TextRecord(described);
+  if (flags.pattern) {
+    TESSERA_ASSIGN_OR_RETURN(const Material fetched, client->FetchMaterial(full_name, context));
+    TESSERA_ASSIGN_OR_RETURN(const MaterialPattern pattern, MeasureMaterialPattern(fetched, context));
+    session.FinishStages();
+    described["pattern"] = DescribePattern(pattern);
+    text += fmt::format("\npattern: {}", PatternText(described["pattern"]));
+  }
+  session.Answer(described, text);
   return absl::OkStatus();
 }
 
@@ -427,9 +444,13 @@ void AddMaterialCommands(CLI::App& app, Session& session) {
   list->callback([&session] { session.run = [&session] { return ListMaterials(session); }; });
 
   CLI::App* show = noun->add_subcommand("show", "One material, its source and its licence");
-  show->add_option("MATERIAL", *name, "Name of the material")->required();
-  show->callback(
-      [&session, name] { session.run = [&session, name] { return ShowMaterial(session, *name); }; });
+  const auto show_flags = std::make_shared<ShowFlags>();
+  show->add_option("MATERIAL", show_flags->name, "Name of the material")->required();
+  show->add_flag("--pattern", show_flags->pattern,
+                 "Fetch it and measure, as synthesis does: anisotropy, feature size, period");
+  show->callback([&session, show_flags] {
+    session.run = [&session, show_flags] { return ShowMaterial(session, *show_flags); };
+  });
 
   CLI::App* pull = noun->add_subcommand("pull", "Download a material's container");
   pull->add_option("MATERIAL", *name, "Name of the material")->required();

@@ -1,4 +1,5 @@
 // tessera mesh dress | redress | info | remesh
+#include <algorithm>
 #include <chrono>
 #include <filesystem>
 #include <memory>
@@ -140,10 +141,48 @@ struct DressFlags {
   std::string output;
 };
 
-void AnswerDressed(Session& session, const DressFlags& flags, uint64_t num_quads, uint64_t num_breaks) {
+// How many broken edges are told in words; --json has all that the dressing lists.
+constexpr size_t kBreaksInText = 5;
+
+Json JsonOfBreaks(const Dressing& dressing, const std::vector<Break>& breaks) {
+  const auto position = [&](const Quad& quad, int corner) {
+    const Eigen::Vector3f& at = dressing.mesh.positions[quad[corner & 3]];
+    return Json{at.x(), at.y(), at.z()};
+  };
+  Json list = Json::array();
+  for (const Break& broken : breaks) {
+    const Quad& quad = dressing.mesh.quads[broken.face];
+    list.push_back({{"quads", {broken.face + 1, broken.other_face + 1}},
+                    {"from", position(quad, broken.side)},
+                    {"to", position(quad, broken.side + 1)}});
+  }
+  return list;
+}
+
+// Tells where an unturned arrangement's frame breaks, and answers.
+absl::Status AnswerDressed(Session& session, const DressFlags& flags, const Dressing& dressing,
+                           const Arrangement& arrangement) {
+  TESSERA_ASSIGN_OR_RETURN(const std::vector<Break> breaks, FindBreaks(dressing, arrangement));
   const std::vector<StageTime> stages = session.FinishStages();
-  session.Answer({{"file", flags.output}, {"num_quads", num_quads}, {"num_breaks", num_breaks}},
-                 fmt::format("{}: {} quads, {} breaks", flags.output, num_quads, num_breaks));
+  const Json list = JsonOfBreaks(dressing, breaks);
+  const size_t num_quads = dressing.tile.size();
+  session.Answer(
+      {{"file", flags.output}, {"num_quads", num_quads}, {"num_breaks", breaks.size()}, {"breaks", list}},
+      fmt::format("{}: {} quads, {} breaks", flags.output, num_quads, breaks.size()));
+  if (breaks.empty()) {
+    return absl::OkStatus();
+  }
+  session.Warn(fmt::format("{}: the frame of {} breaks at {} edge{}, where tiles do not match{}",
+                           flags.output, arrangement.id, breaks.size(), breaks.size() == 1 ? "" : "s",
+                           breaks.size() > kBreaksInText ? "; --json lists all, the first are" : ""));
+  for (size_t i = 0; i < std::min(breaks.size(), kBreaksInText); ++i) {
+    const Quad& quad = dressing.mesh.quads[breaks[i].face];
+    session.Note(
+        fmt::format("{}, quads {} and {}",
+                    EdgeName(dressing.mesh.positions, quad[breaks[i].side], quad[(breaks[i].side + 1) & 3]),
+                    breaks[i].face + 1, breaks[i].other_face + 1));
+  }
+  return absl::OkStatus();
 }
 
 absl::Status DressHere(Session& session, const DressFlags& flags) {
@@ -158,8 +197,7 @@ absl::Status DressHere(Session& session, const DressFlags& flags) {
                            DressMesh(read.mesh, *arrangement, params, session.Context()));
   TESSERA_ASSIGN_OR_RETURN(const std::string bytes, SerializeDressing(result.dressing));
   TESSERA_RETURN_IF_ERROR(WriteFileAtomically(flags.output, bytes));
-  AnswerDressed(session, flags, result.dressing.tile.size(), result.breaks.size());
-  return absl::OkStatus();
+  return AnswerDressed(session, flags, result.dressing, *arrangement);
 }
 
 absl::Status DressThere(Session& session, const DressFlags& flags) {
@@ -178,8 +216,10 @@ absl::Status DressThere(Session& session, const DressFlags& flags) {
   request.set_target_quads(flags.target_quads);
   TESSERA_ASSIGN_OR_RETURN(const v1::DressMeshResponse response, client->DressMesh(request, context));
   TESSERA_RETURN_IF_ERROR(client->DownloadFile(response.dressing(), flags.output, context));
-  AnswerDressed(session, flags, response.num_quads(), response.num_breaks());
-  return absl::OkStatus();
+  TESSERA_ASSIGN_OR_RETURN(const Arrangement* arrangement, FindArrangement(flags.arrangement));
+  TESSERA_ASSIGN_OR_RETURN(const std::string bytes, ReadWholeFile(flags.output));
+  TESSERA_ASSIGN_OR_RETURN(const Dressing dressing, ParseDressing(BytesOf(bytes)));
+  return AnswerDressed(session, flags, dressing, *arrangement);
 }
 
 struct RedressFlags {

@@ -11,6 +11,7 @@
 #include "client/cli/certificate.h"
 #include "client/cli/commands.h"
 #include "client/cli/describe.h"
+#include "client/cli/pattern.h"
 #include "client/lib/names.h"
 
 namespace tessera::cli {
@@ -20,8 +21,8 @@ struct SynthesizeFlags {
   std::string material;
   std::string arrangement;
   std::string name;
-  uint32_t tile_size = 64;
-  uint32_t strip_height = 16;
+  uint32_t tile_size = 0;
+  uint32_t strip_height = 0;
   uint64_t seed = 1;
   std::string method = "frame";
   bool force = false;
@@ -39,6 +40,24 @@ std::string SummaryOf(const v1::TileSet& tile_set) {
 void WarnOfSeams(Session& session, const Json& tile_set) {
   for (const std::string& warning : CertificateWarnings(tile_set["certificate"])) {
     session.Warn(fmt::format("{}: {}", tile_set["name"].get<std::string>(), warning));
+  }
+}
+
+// What synthesis has to say of the sizes, a sentence each.
+void TellOfSizes(Session& session, const Json& tile_set) {
+  const auto sentences_at = [&](const char* place) {
+    std::vector<std::string> sentences;
+    for (const Json& line : tile_set.value(Json::json_pointer(place), Json::array())) {
+      sentences.push_back(fmt::format("{}: {}", tile_set["name"].get<std::string>(),
+                                      line.is_string() ? line.get<std::string>() : line.dump()));
+    }
+    return sentences;
+  };
+  for (const std::string& note : sentences_at("/metadata/notes")) {
+    session.Note(note);
+  }
+  for (const std::string& warning : sentences_at("/metadata/warnings")) {
+    session.Warn(warning);
   }
 }
 
@@ -67,6 +86,11 @@ absl::Status RunSynthesize(Session& session, const SynthesizeFlags& flags) {
   const std::vector<StageTime> stages = session.FinishStages();
   const Json described = Describe(tile_set);
   std::string text = SummaryOf(tile_set);
+  if (const std::string pattern =
+          PatternText(described.value(Json::json_pointer("/metadata/pattern"), Json::object()));
+      !pattern.empty()) {
+    text += fmt::format("\n{}", pattern);
+  }
   double total = 0;
   for (const StageTime& stage : stages) {
     text += fmt::format("\n{:<12} {:8.2f} s", stage.stage, stage.seconds);
@@ -76,6 +100,7 @@ absl::Status RunSynthesize(Session& session, const SynthesizeFlags& flags) {
   session.Answer(
       {{"tile_set", described}, {"stages", Session::JsonOfStages(stages)}, {"job", ShortName(job.name())}},
       fmt::format("{}\n{}", text, CertificateText(described["certificate"])));
+  TellOfSizes(session, described);
   WarnOfSeams(session, described);
   return absl::OkStatus();
 }
@@ -189,12 +214,11 @@ void AddSynthesize(CLI::App& noun, Session& session) {
   command->add_option("--arrangement", flags->arrangement, "plane-16, plane-81, surface-26, surface-96..")
       ->required();
   command->add_option("--name", flags->name, "Name of the tile set [the material's]");
-  command->add_option("--tile", flags->tile_size, "Texels per tile side, at least twice the strip")
-      ->capture_default_str();
-  command
-      ->add_option("--strip", flags->strip_height,
-                   "Height of the strips in texels: even, from 8; about a feature")
-      ->capture_default_str();
+  command->add_option("--tile", flags->tile_size,
+                      "Texels per tile side, at least twice the strip [64; of a regular material in plane-16 "
+                      "the nearest size that keeps its period]");
+  command->add_option("--strip", flags->strip_height,
+                      "Height of the strips in texels: even, from 8 [the material's feature size]");
   command->add_option("--seed", flags->seed, "Same seed, same tile set")->capture_default_str();
   command
       ->add_option("--method", flags->method,

@@ -268,6 +268,15 @@ class MainJobTest(harness.CommandTest):
         self.assertEqual(made["tile_set"]["metadata"]["method"], "diamond-cut")
         self.assertIn("diamond-cut", self.run_ok("tileset", "show", "surface-96/diamonds").out)
         self.run_ok("tileset", "delete", "surface-96/diamonds")
+        measured = self.run_json("material", "show", "skin", "--pattern")["pattern"]
+        self.assertEqual(made["tile_set"]["metadata"]["pattern"], measured)
+        self.assertIn("pattern: anisotropy ", self.run_ok("material", "show", "skin", "--pattern").out)
+        by_rule = self.tessera("tileset", "synthesize", "skin", "--arrangement", "plane-16", "--tile", 32, "--force",
+                               "--name", "by-rule")
+        self.assertEqual(by_rule.code, 0, by_rule)
+        self.assertIn("strips 8 high", by_rule.out)
+        self.assertIn(f"strip 8: features of {measured['feature_size']:.1f} texels", by_rule.err)
+        self.run_ok("tileset", "delete", "plane-16/by-rule")
         unknown = self.tessera("tileset", "synthesize", "skin", *SYNTHESIZE, "--method", "hexagon")
         self.assertEqual((unknown.code, unknown.out), (2, ""), unknown)
         self.assertIn("hexagon", unknown.err)
@@ -301,6 +310,16 @@ class MainJobTest(harness.CommandTest):
         self.run_ok("mesh", "dress", "builtin:plane", "--arrangement", "plane-16", "-o", "plane.tsra")
         self.assert_fails(5, "mesh", "redress", "plane.tsra", "--tileset", "surface-96/skin", says="plane-16")
         self.assert_fails(5, "mesh", "dress", "builtin:genus3", "--arrangement", "plane-16", "-o", "g.tsra", says="break")
+        for where in ([], ["--on-server"]):
+            broken = ["mesh", "dress", "builtin:genus3", "--arrangement", "plane-16", "--allow-breaks", *where, "-o", "g.tsra"]
+            listed = self.run_json(*broken)
+            self.assertEqual(len(listed["breaks"]), listed["num_breaks"])
+            self.assertGreater(listed["num_breaks"], 0)
+            self.assertEqual([len(listed["breaks"][0][key]) for key in ("quads", "from", "to")], [2, 3, 3])
+            said = self.tessera(*broken)
+            self.assertEqual(said.code, 0, said)
+            self.assertIn(f"breaks at {listed['num_breaks']} edges", said.err)
+            self.assertRegex(said.err, r"edge between vertices .* quads \d+ and \d+")
         # A container of another kind is no dressing.
         self.assert_fails(5, "mesh", "redress", "skin-tiles.tsra", "--tileset", "surface-96/skin")
 

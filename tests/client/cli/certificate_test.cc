@@ -26,6 +26,17 @@ TEST(CertificateTest, PutsSeamsBesideTheControls) {
   EXPECT_FALSE(CertificateText(Json::object()).empty());
 }
 
+TEST(CertificateTest, TellsWhetherARegularMaterialKeepsItsPeriod) {
+  const auto with = [](double kept) {
+    return Json{{"repetition", {{"period", {{"kept", kept}, {"plane", 0.4}, {"exemplar", 0.8}}}}}};
+  };
+  EXPECT_NE(CertificateText(with(0.5)).find("period kept 0.50 times as well"), std::string::npos);
+  EXPECT_TRUE(CertificateWarnings(with(0.95)).empty());
+  const std::vector<std::string> warnings = CertificateWarnings(with(0.5));
+  ASSERT_EQ(warnings.size(), 1u);
+  EXPECT_NE(warnings[0].find("keeps 0.50 of it, below the limit of 0.80"), std::string::npos) << warnings[0];
+}
+
 TEST(CertificateTest, SaysNothingOfACertificateWithoutFigures) {
   EXPECT_TRUE(CertificateWarnings(Json::object()).empty());
   EXPECT_TRUE(CertificateWarnings(Json("none")).empty());
