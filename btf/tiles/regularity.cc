@@ -96,19 +96,29 @@ std::vector<CorrelationPeak> PeaksOf(const Autocorrelation& autocorrelation) {
   return peaks;
 }
 
-// Whether `b` is more than another place along the stripes that `a` counts: between it and the nearest
-// multiple of `a` the autocorrelation dips.
-bool IsAnotherPeriod(const Autocorrelation& autocorrelation, const PeriodVector& a, const PeriodVector& b,
-                     double highest) {
-  const double times = std::round((a[0] * b[0] + a[1] * b[1]) / (a[0] * a[0] + a[1] * a[1]));
-  const PeriodVector rest = Sum(b, -times, a);
-  return autocorrelation.at(static_cast<int>(std::lround(rest[0] / 2.0)),
-                            static_cast<int>(std::lround(rest[1] / 2.0))) < kLargestDip * highest;
+// Whether the autocorrelation dips half way to `shift`: it does not where that runs along a stripe.
+bool DipsOnTheWay(const Autocorrelation& autocorrelation, const PeriodVector& shift, double highest) {
+  const PeriodVector half = {shift[0] / 2.0, shift[1] / 2.0};
+  return !Reaches(autocorrelation, half, 1) ||
+         autocorrelation.at(static_cast<int>(std::lround(half[0])), static_cast<int>(std::lround(half[1]))) <
+             kLargestDip * highest;
 }
 
-// Fits the vectors to the peaks found at their sums, from the nearest ones outwards.
+// Whether `b` is more than another place along the stripes that `a` counts.
+bool IsAnotherPeriod(const Autocorrelation& autocorrelation, const PeriodVector& a, const PeriodVector& b,
+                     double highest) {
+  constexpr int kMultiples = 3;  // either way; `a` need not stand square on the stripes
+  const double nearest = std::round((a[0] * b[0] + a[1] * b[1]) / (a[0] * a[0] + a[1] * a[1]));
+  for (int i = -kMultiples; i <= kMultiples; ++i) {
+    if (!DipsOnTheWay(autocorrelation, Sum(b, -(nearest + i), a), highest)) {
+      return false;
+    }
+  }
+  return true;
+}
+
+// Fits the two vectors to the peaks found at their sums, from the nearest ones outwards.
 void Sharpen(const Autocorrelation& autocorrelation, std::vector<PeriodVector>& vectors) {
-  const bool both = vectors.size() == 2;
   const int farthest = static_cast<int>(std::max(autocorrelation.most_x(), autocorrelation.most_y()) /
                                         std::max(1.0, Length(vectors[0])));
   for (int reach = 1; reach <= farthest; ++reach) {
@@ -119,9 +129,8 @@ void Sharpen(const Autocorrelation& autocorrelation, std::vector<PeriodVector>& 
     PeriodVector ip = {};
     PeriodVector jp = {};
     for (int i = 0; i <= reach; ++i) {
-      for (int j = both ? -reach : 0; j <= (both ? reach : 0); ++j) {
-        const PeriodVector expected = both ? Sum({i * vectors[0][0], i * vectors[0][1]}, j, vectors[1])
-                                           : PeriodVector{i * vectors[0][0], i * vectors[0][1]};
+      for (int j = -reach; j <= reach; ++j) {
+        const PeriodVector expected = Sum({i * vectors[0][0], i * vectors[0][1]}, j, vectors[1]);
         if ((i == 0 && j <= 0) || !Reaches(autocorrelation, expected, 3)) {
           continue;
         }
@@ -137,15 +146,39 @@ void Sharpen(const Autocorrelation& autocorrelation, std::vector<PeriodVector>& 
       }
     }
     const double determinant = ii * jj - ij * ij;
-    if (both && determinant > 0.0) {
-      for (int axis = 0; axis < 2; ++axis) {
-        vectors[0][axis] = (jj * ip[axis] - ij * jp[axis]) / determinant;
-        vectors[1][axis] = (ii * jp[axis] - ij * ip[axis]) / determinant;
-      }
-    } else if (!both && ii > 0.0) {
-      vectors[0] = {ip[0] / ii, ip[1] / ii};
+    for (int axis = 0; axis < 2 && determinant > 0.0; ++axis) {
+      vectors[0][axis] = (jj * ip[axis] - ij * jp[axis]) / determinant;
+      vectors[1][axis] = (ii * jp[axis] - ij * ip[axis]) / determinant;
     }
   }
+}
+
+// The period square to stripes, from any on the first stripe: p / |p|^2 is fitted to whole numbers at the
+// peaks, from the nearest ones outwards.
+PeriodVector SquareToStripes(const std::vector<CorrelationPeak>& peaks, const PeriodVector& first) {
+  PeriodVector wave = {first[0] / (Length(first) * Length(first)),
+                       first[1] / (Length(first) * Length(first))};
+  for (int reach = 2; reach <= 8; ++reach) {
+    double xx = 0.0;
+    double xy = 0.0;
+    double yy = 0.0;
+    PeriodVector wanted = {};
+    for (const CorrelationPeak& peak : peaks) {
+      if (Length(peak.at) <= reach * Length(first)) {
+        xx += peak.at[0] * peak.at[0];
+        xy += peak.at[0] * peak.at[1];
+        yy += peak.at[1] * peak.at[1];
+        wanted = Sum(wanted, std::round(wave[0] * peak.at[0] + wave[1] * peak.at[1]), peak.at);
+      }
+    }
+    const double determinant = xx * yy - xy * xy;
+    if (determinant > 0.0) {
+      wave = {(yy * wanted[0] - xy * wanted[1]) / determinant,
+              (xx * wanted[1] - xy * wanted[0]) / determinant};
+    }
+  }
+  const double square = wave[0] * wave[0] + wave[1] * wave[1];
+  return square > 0.0 ? PeriodVector{wave[0] / square, wave[1] / square} : first;
 }
 
 // Distance of a shift from the nearest sum of whole periods.
@@ -176,7 +209,7 @@ std::optional<Period> FindPeriod(const Autocorrelation& autocorrelation) {
   }
   Period period;
   for (const CorrelationPeak& peak : peaks) {
-    if (peak.value < kNearlyHighest * highest) {
+    if (peak.value < kNearlyHighest * highest || !DipsOnTheWay(autocorrelation, peak.at, highest)) {
       continue;
     }
     if (period.vectors.empty()) {
@@ -193,7 +226,11 @@ std::optional<Period> FindPeriod(const Autocorrelation& autocorrelation) {
   if (period.vectors.empty()) {
     return std::nullopt;
   }
-  Sharpen(autocorrelation, period.vectors);
+  if (period.vectors.size() == 1) {
+    period.vectors[0] = SquareToStripes(peaks, period.vectors[0]);
+  } else {
+    Sharpen(autocorrelation, period.vectors);
+  }
   return period;
 }
 
