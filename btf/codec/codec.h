@@ -5,8 +5,11 @@
 //   TESSERA_ASSIGN_OR_RETURN(Material material, codec->Encode(source, {.kl = 25, .kv = 25}, context));
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <filesystem>
+#include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -79,6 +82,13 @@ struct CodecGlsl {
       shared_words;  // usamplerBuffer `codec_words`, format RGBA32UI; not declared when empty
 };
 
+// A BTFel turned by quarter turns, counter-clockwise, has coefficients c'[i] = sign[i] * c[source[i]].
+struct CoefficientTurn {
+  std::vector<int> source;
+  std::vector<float> sign;
+};
+using CoefficientTurns = std::array<CoefficientTurn, 4>;  // by turns; 0 is the identity
+
 class Codec {
  public:
   virtual ~Codec() = default;
@@ -97,7 +107,18 @@ class Codec {
   [[nodiscard]] virtual absl::StatusOr<Embedding> Embed(const Material& material, int dims,
                                                         const RunContext& context) const = 0;
 
-  [[nodiscard]] virtual absl::StatusOr<CodecGlsl> Glsl(const BtfelTable& table) const = 0;
+  // The BTFels of `more`, which share the codec's tables with `table`, are numbered on from those of `table`;
+  // each may have a quantisation of its own, except with "view-pca". Errors: INVALID_ARGUMENT naming the
+  // table or parameter that is missing or misshapen, or the one of `more` that does not go with `table`.
+  [[nodiscard]] virtual absl::StatusOr<CodecGlsl> Glsl(const BtfelTable& table,
+                                                       std::span<const BtfelTable* const> more) const = 0;
+
+  // What quarter turns do to coefficients; nothing where turning is no signed permutation of them.
+  // Errors: INVALID_ARGUMENT naming the table or parameter that is missing or misshapen.
+  [[nodiscard]] virtual absl::StatusOr<std::optional<CoefficientTurns>> Turns(
+      const BtfelTable& /*table*/) const {
+    return std::nullopt;
+  }
 };
 
 // nullptr when unknown. Codecs are immutable and live for the whole program.

@@ -422,7 +422,7 @@ absl::StatusOr<std::unique_ptr<GlPreview>> GlPreview::Create(OffscreenContext& c
   if (codec == nullptr) {
     return absl::UnimplementedError(absl::StrCat("codec ", tile_set.btfels.codec_id, " is not known here"));
   }
-  TESSERA_ASSIGN_OR_RETURN(const CodecGlsl glsl, codec->Glsl(tile_set.btfels));
+  TESSERA_ASSIGN_OR_RETURN(const CodecGlsl glsl, codec->Glsl(tile_set.btfels, {}));
   const ScopedCurrent current(context);
   TESSERA_RETURN_IF_ERROR(current.status());
   TESSERA_ASSIGN_OR_RETURN(GlState* const state, context.gl_state());

@@ -16,8 +16,9 @@ absl::StatusOr<Embedding> DfmfCodec::Embed(const Material& material, int dims,
   return EmbedDfmf(material, dims, context);
 }
 
-absl::StatusOr<CodecGlsl> DfmfCodec::Glsl(const BtfelTable& table) const {
-  return DfmfGlsl(table);
+absl::StatusOr<CodecGlsl> DfmfCodec::Glsl(const BtfelTable& table,
+                                          std::span<const BtfelTable* const> more) const {
+  return DfmfGlsl(table, more);
 }
 
 }  // namespace tessera

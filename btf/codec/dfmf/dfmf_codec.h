@@ -14,7 +14,8 @@ class DfmfCodec final : public Codec {
                                                 const RunContext& context) const override;
   [[nodiscard]] absl::StatusOr<Embedding> Embed(const Material& material, int dims,
                                                 const RunContext& context) const override;
-  [[nodiscard]] absl::StatusOr<CodecGlsl> Glsl(const BtfelTable& table) const override;
+  [[nodiscard]] absl::StatusOr<CodecGlsl> Glsl(const BtfelTable& table,
+                                               std::span<const BtfelTable* const> more) const override;
 };
 
 }  // namespace tessera

@@ -222,15 +222,33 @@ void PackFactors(const DfmfDecoder& decoder, std::span<const float> scales, cons
   }
 }
 
+// The table's BTFels as multiples of `scales`; `words` are 0 and have room for them. Where they end.
+uint32_t* PackBtfels(const BtfelTable& table, std::span<const float> scales, size_t luma_rank,
+                     const Layout& layout, uint32_t* words) {
+  for (size_t btfel = 0; btfel < table.size(); ++btfel) {
+    const std::span<const uint8_t> codes = table.btfel(btfel);
+    for (size_t i = 0; i < codes.size(); ++i) {
+      const size_t place =
+          i < luma_rank ? i : static_cast<size_t>(layout.luma_groups) * kGroup + (i - luma_rank);
+      const float value = table.offset[i] + table.step[i] * static_cast<float>(codes[i]);
+      const float code = scales[i] > 0.0F ? value / scales[i] : 0.0F;
+      words[place / 2] |= Code16(code) << (16 * (place % 2));
+    }
+    words += static_cast<ptrdiff_t>(layout.btfel_texels()) * 4;
+  }
+  return words;
+}
+
 }  // namespace
 
-absl::StatusOr<CodecGlsl> DfmfGlsl(const BtfelTable& table) {
+absl::StatusOr<CodecGlsl> DfmfGlsl(const BtfelTable& table, std::span<const BtfelTable* const> more) {
   TESSERA_ASSIGN_OR_RETURN(const std::unique_ptr<DfmfDecoder> decoder, DfmfDecoder::Create(table));
   const size_t k = table.num_coefficients;
   if (table.codes.size() % k != 0) {
     return absl::InvalidArgumentError(
         absl::StrCat(table.codes.size(), " codes are not a multiple of ", k, " coefficients"));
   }
+  TESSERA_RETURN_IF_ERROR(CheckSameCoefficients(table, more));
   const Layout layout(*decoder);
   CodecGlsl glsl;
   glsl.source = Source(layout);
@@ -244,22 +262,16 @@ absl::StatusOr<CodecGlsl> DfmfGlsl(const BtfelTable& table) {
     }
   }
   std::vector<float> scales(k);
-  std::ranges::transform(LargestMagnitudes(table), scales.begin(),
+  std::ranges::transform(LargestMagnitudes(table, more), scales.begin(),
                          [](double largest) { return static_cast<float>(largest) / kMostCode; });
   PackFactors(*decoder, scales, layout, glsl);
 
   glsl.words_per_btfel = layout.btfel_texels() * 4;
-  glsl.btfel_words.resize(table.size() * glsl.words_per_btfel);
-  const size_t r = decoder->luma_rank();
-  for (size_t btfel = 0; btfel < table.size(); ++btfel) {
-    const std::span<const uint8_t> codes = table.btfel(btfel);
-    uint32_t* const words = glsl.btfel_words.data() + btfel * glsl.words_per_btfel;
-    for (size_t i = 0; i < k; ++i) {
-      const size_t place = i < r ? i : static_cast<size_t>(layout.luma_groups) * kGroup + (i - r);
-      const float value = table.offset[i] + table.step[i] * static_cast<float>(codes[i]);
-      const float code = scales[i] > 0.0F ? value / scales[i] : 0.0F;
-      words[place / 2] |= Code16(code) << (16 * (place % 2));
-    }
+  glsl.btfel_words.resize(TotalSize(table, more) * glsl.words_per_btfel);
+  const int luma_rank = decoder->luma_rank();
+  uint32_t* words = PackBtfels(table, scales, luma_rank, layout, glsl.btfel_words.data());
+  for (const BtfelTable* const other : more) {
+    words = PackBtfels(*other, scales, luma_rank, layout, words);
   }
   return glsl;
 }

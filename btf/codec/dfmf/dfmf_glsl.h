@@ -1,6 +1,8 @@
 // The decoder of dfmf as GLSL, with the tables it reads. Same semantics as DfmfDecoder::Evaluate.
 #pragma once
 
+#include <span>
+
 #include <absl/status/statusor.h>
 
 #include "btf/codec/btfel_table.h"
@@ -13,6 +15,7 @@ namespace tessera {
 // of each; factors at pairs of nodes, times that magnitude, with one scale for eight of them, to 2^-16 of the
 // largest contribution of any of the eight. Errors: INVALID_ARGUMENT naming the table or parameter that is
 // missing or misshapen.
-[[nodiscard]] absl::StatusOr<CodecGlsl> DfmfGlsl(const BtfelTable& table);
+[[nodiscard]] absl::StatusOr<CodecGlsl> DfmfGlsl(const BtfelTable& table,
+                                                 std::span<const BtfelTable* const> more = {});
 
 }  // namespace tessera

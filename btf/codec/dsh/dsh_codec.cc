@@ -2,6 +2,7 @@
 
 #include "btf/codec/dsh/dsh_embedding.h"
 #include "btf/codec/dsh/dsh_glsl.h"
+#include "btf/codec/dsh/dsh_turns.h"
 
 namespace tessera {
 
@@ -15,8 +16,13 @@ absl::StatusOr<Embedding> DshCodec::Embed(const Material& material, int dims,
   return EmbedDsh(material, dims, context);
 }
 
-absl::StatusOr<CodecGlsl> DshCodec::Glsl(const BtfelTable& table) const {
-  return DshGlsl(table);
+absl::StatusOr<CodecGlsl> DshCodec::Glsl(const BtfelTable& table,
+                                         std::span<const BtfelTable* const> more) const {
+  return DshGlsl(table, more);
+}
+
+absl::StatusOr<std::optional<CoefficientTurns>> DshCodec::Turns(const BtfelTable& table) const {
+  return DshTurns(table);
 }
 
 }  // namespace tessera

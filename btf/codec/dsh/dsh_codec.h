@@ -22,7 +22,9 @@ class DshCodec final : public Codec {
                                                 const RunContext& context) const override;
   [[nodiscard]] absl::StatusOr<Embedding> Embed(const Material& material, int dims,
                                                 const RunContext& context) const override;
-  [[nodiscard]] absl::StatusOr<CodecGlsl> Glsl(const BtfelTable& table) const override;
+  [[nodiscard]] absl::StatusOr<CodecGlsl> Glsl(const BtfelTable& table,
+                                               std::span<const BtfelTable* const> more) const override;
+  [[nodiscard]] absl::StatusOr<std::optional<CoefficientTurns>> Turns(const BtfelTable& table) const override;
 
  private:
   std::string_view id_;

@@ -14,6 +14,7 @@
 #include "btf/base/parallel.h"
 #include "btf/base/status_macros.h"
 #include "btf/codec/dsh/dsh_decoder.h"
+#include "btf/codec/dsh/dsh_turns.h"
 #include "btf/codec/feature_pca.h"
 #include "btf/math/hemisphere_gram.h"
 #include "btf/math/spherical_harmonics.h"
@@ -42,19 +43,13 @@ Eigen::MatrixXd Weighting(const Eigen::MatrixXd& basis, double max_theta_rad, co
   return SquareRoot(GramMatrix(plain.transpose(), quadrature.weights)) * basis.transpose();
 }
 
-FeatureTurns MakeTurns(Eigen::Index kl, Eigen::Index kv) {
+FeatureTurns MakeTurns(int kl, int kv) {
   std::array<std::vector<int>, kQuarterTurns> source;
   std::array<std::vector<double>, kQuarterTurns> sign;
   for (int turns = 0; turns < kQuarterTurns; ++turns) {
-    const ShQuarterTurns q = MakeShQuarterTurns(turns);
-    for (Eigen::Index channel = 0; channel < 3; ++channel) {
-      for (Eigen::Index j = 0; j < kv; ++j) {
-        for (Eigen::Index i = 0; i < kl; ++i) {
-          source[turns].push_back(static_cast<int>((channel * kv + q.source[j]) * kl + q.source[i]));
-          sign[turns].push_back(q.sign[j] * q.sign[i]);
-        }
-      }
-    }
+    CoefficientTurn turn = MakeDshTurn(kl, kv, turns);
+    source[turns] = std::move(turn.source);
+    sign[turns].assign(turn.sign.begin(), turn.sign.end());
   }
   return {std::move(source), std::move(sign)};
 }

@@ -178,6 +178,9 @@ struct Layout {
   [[nodiscard]] int row_codes() const { return 3 * kl; }
   // Of one row of a BTFel; each starts at a texel.
   [[nodiscard]] int btfel_row_texels() const { return (row_codes() + kCodesPerTexel - 1) / kCodesPerTexel; }
+  [[nodiscard]] int btfel_words() const { return kv * btfel_row_texels() * 4; }
+  // The place of a coefficient in a BTFel of a table.
+  [[nodiscard]] int coefficient(int channel, int j, int i) const { return (channel * kv + j) * kl + i; }
 
  private:
   static int Texels(int floats) { return (floats + 3) / 4; }
@@ -318,9 +321,45 @@ void CopyBasis(const CodecTable& basis, int size, BasisForm form, int first_texe
   }
 }
 
+// The table's BTFels as multiples of the products of scales; `words` has room for them. Where they end.
+uint32_t* PackBtfels(const BtfelTable& table, const Layout& layout, std::span<const float> light_scale,
+                     std::span<const float> view_scale, uint32_t* words) {
+  const size_t k = table.num_coefficients;
+  std::vector<float> step(k);
+  std::vector<float> offset(k);  // and what makes the conversion to int round down, then to the nearest
+  for (int channel = 0; channel < 3; ++channel) {
+    for (int j = 0; j < layout.kv; ++j) {
+      for (int i = 0; i < layout.kl; ++i) {
+        const int n = layout.coefficient(channel, j, i);
+        const double scale = static_cast<double>(light_scale[i]) * view_scale[j];
+        step[n] = static_cast<float>(table.step[n] / scale);
+        offset[n] = static_cast<float>(table.offset[n] / scale + kMostCode + 0.5);
+      }
+    }
+  }
+  // Code n of a row is bits 16 (n % 2) and on of word n / 2: on the little-endian machines that this is for,
+  // 16-bit numbers in order.
+  static_assert(std::endian::native == std::endian::little);
+  const int row_words = layout.btfel_row_texels() * 4;
+  auto* row = reinterpret_cast<int16_t*>(words);
+  for (size_t btfel = 0; btfel < table.size(); ++btfel) {
+    const uint8_t* const codes = table.codes.data() + btfel * k;
+    for (int j = 0; j < layout.kv; ++j, row += 2 * static_cast<ptrdiff_t>(row_words)) {
+      for (int channel = 0; channel < 3; ++channel) {
+        const int first = layout.coefficient(channel, j, 0);
+        for (int i = 0; i < layout.kl; ++i) {
+          const float code = offset[first + i] + step[first + i] * static_cast<float>(codes[first + i]);
+          row[channel * layout.kl + i] = static_cast<int16_t>(static_cast<int>(code) - kMostCode);
+        }
+      }
+    }
+  }
+  return words + table.size() * layout.btfel_words();
+}
+
 }  // namespace
 
-absl::StatusOr<CodecGlsl> DshGlsl(const BtfelTable& table) {
+absl::StatusOr<CodecGlsl> DshGlsl(const BtfelTable& table, std::span<const BtfelTable* const> more) {
   Layout layout;
   TESSERA_ASSIGN_OR_RETURN(layout.kl, BasisSize(table, "basis_light"));
   TESSERA_ASSIGN_OR_RETURN(layout.kv, BasisSize(table, "basis_view"));
@@ -334,6 +373,7 @@ absl::StatusOr<CodecGlsl> DshGlsl(const BtfelTable& table) {
                      table.num_coefficients, " with ", table.offset.size(), " offsets, ", table.step.size(),
                      " steps and ", table.codes.size(), " codes"));
   }
+  TESSERA_RETURN_IF_ERROR(CheckSameCoefficients(table, more));
   const CodecTable& basis_light = table.tables.at("basis_light");
   const CodecTable& basis_view = table.tables.at("basis_view");
   layout.light_form = FormOf(basis_light, layout.kl);
@@ -348,16 +388,13 @@ absl::StatusOr<CodecGlsl> DshGlsl(const BtfelTable& table) {
   glsl.shared_values[3] = static_cast<float>(std::sin(view_theta));
 
   // The scales: no coefficient's value exceeds the largest code times those of its functions.
-  const auto coefficient = [&](int channel, int j, int i) {
-    return (channel * layout.kv + j) * layout.kl + i;
-  };
-  const std::vector<double> magnitudes = LargestMagnitudes(table);
+  const std::vector<double> magnitudes = LargestMagnitudes(table, more);
   std::vector<double> largest(static_cast<size_t>(layout.kl) * layout.kv, 0.0);
   for (int i = 0; i < layout.kl; ++i) {
     for (int j = 0; j < layout.kv; ++j) {
       for (int channel = 0; channel < 3; ++channel) {
         largest[i * layout.kv + j] =
-            std::max(largest[i * layout.kv + j], magnitudes[coefficient(channel, j, i)]);
+            std::max(largest[i * layout.kv + j], magnitudes[layout.coefficient(channel, j, i)]);
       }
     }
   }
@@ -372,36 +409,11 @@ absl::StatusOr<CodecGlsl> DshGlsl(const BtfelTable& table) {
   CopyBasis(basis_light, layout.kl, layout.light_form, layout.light_basis_begin(), &glsl.shared_values);
   CopyBasis(basis_view, layout.kv, layout.view_form, layout.view_basis_begin(), &glsl.shared_values);
 
-  std::vector<float> step(k);
-  std::vector<float> offset(k);  // and what makes the conversion to int round down, then to the nearest
-  for (int channel = 0; channel < 3; ++channel) {
-    for (int j = 0; j < layout.kv; ++j) {
-      for (int i = 0; i < layout.kl; ++i) {
-        const int n = coefficient(channel, j, i);
-        const double scale = static_cast<double>(light_scale[i]) * view_scale[j];
-        step[n] = static_cast<float>(table.step[n] / scale);
-        offset[n] = static_cast<float>(table.offset[n] / scale + kMostCode + 0.5);
-      }
-    }
-  }
-  // Code n of a row is bits 16 (n % 2) and on of word n / 2: on the little-endian machines that this is for,
-  // 16-bit numbers in order.
-  static_assert(std::endian::native == std::endian::little);
-  const int row_words = layout.btfel_row_texels() * 4;
-  glsl.words_per_btfel = layout.kv * row_words;
-  glsl.btfel_words.resize(table.size() * glsl.words_per_btfel);
-  auto* row = reinterpret_cast<int16_t*>(glsl.btfel_words.data());
-  for (size_t btfel = 0; btfel < table.size(); ++btfel) {
-    const uint8_t* const codes = table.codes.data() + btfel * k;
-    for (int j = 0; j < layout.kv; ++j, row += 2 * static_cast<ptrdiff_t>(row_words)) {
-      for (int channel = 0; channel < 3; ++channel) {
-        const int first = coefficient(channel, j, 0);
-        for (int i = 0; i < layout.kl; ++i) {
-          const float code = offset[first + i] + step[first + i] * static_cast<float>(codes[first + i]);
-          row[channel * layout.kl + i] = static_cast<int16_t>(static_cast<int>(code) - kMostCode);
-        }
-      }
-    }
+  glsl.words_per_btfel = layout.btfel_words();
+  glsl.btfel_words.resize(TotalSize(table, more) * glsl.words_per_btfel);
+  uint32_t* words = PackBtfels(table, layout, light_scale, view_scale, glsl.btfel_words.data());
+  for (const BtfelTable* const other : more) {
+    words = PackBtfels(*other, layout, light_scale, view_scale, words);
   }
   return glsl;
 }

@@ -1,6 +1,8 @@
 // The decoder of dsh* as GLSL, with the tables it reads. Same semantics as DshDecoder::Evaluate.
 #pragma once
 
+#include <span>
+
 #include <absl/status/statusor.h>
 
 #include "btf/codec/btfel_table.h"
@@ -15,6 +17,7 @@ namespace tessera {
 // is about 2^-15 of the largest value that the coefficients of i and j take, a few times that where these
 // magnitudes are far from a product. Errors: INVALID_ARGUMENT naming the table or parameter that is missing
 // or misshapen.
-[[nodiscard]] absl::StatusOr<CodecGlsl> DshGlsl(const BtfelTable& table);
+[[nodiscard]] absl::StatusOr<CodecGlsl> DshGlsl(const BtfelTable& table,
+                                                std::span<const BtfelTable* const> more = {});
 
 }  // namespace tessera

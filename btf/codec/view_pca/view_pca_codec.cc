@@ -16,8 +16,9 @@ absl::StatusOr<Embedding> ViewPcaCodec::Embed(const Material& material, int dims
   return EmbedDecoded(material, dims, context);
 }
 
-absl::StatusOr<CodecGlsl> ViewPcaCodec::Glsl(const BtfelTable& table) const {
-  return ViewPcaGlsl(table);
+absl::StatusOr<CodecGlsl> ViewPcaCodec::Glsl(const BtfelTable& table,
+                                             std::span<const BtfelTable* const> more) const {
+  return ViewPcaGlsl(table, more);
 }
 
 }  // namespace tessera

@@ -4,12 +4,14 @@
 #include <array>
 #include <cstring>
 #include <memory>
+#include <span>
 #include <string>
 #include <vector>
 
 #include <absl/strings/str_cat.h>
 
 #include "btf/base/status_macros.h"
+#include "btf/codec/coefficient_range.h"
 #include "btf/codec/turns_glsl.h"
 #include "btf/codec/view_pca/view_pca_decoder.h"
 
@@ -180,15 +182,33 @@ void AppendInterpolator(const HemisphereInterpolator& interpolator, std::vector<
   }
 }
 
+// The table's codes, each view's from a texel on; `words` are 0 and have room for them. Where they end.
+uint32_t* PackBtfels(const BtfelTable& table, const Layout& layout, uint32_t* words) {
+  const uint8_t* const end = table.codes.data() + table.codes.size();
+  for (const uint8_t* codes = table.codes.data(); codes != end; codes += layout.view_codes()) {
+    for (int n = 0; n < layout.view_codes(); ++n) {
+      words[n / 4] |= static_cast<uint32_t>(codes[n]) << (8 * (n % 4));
+    }
+    words += static_cast<ptrdiff_t>(layout.btfel_view_texels()) * 4;
+  }
+  return words;
+}
+
 }  // namespace
 
-absl::StatusOr<CodecGlsl> ViewPcaGlsl(const BtfelTable& table) {
+absl::StatusOr<CodecGlsl> ViewPcaGlsl(const BtfelTable& table, std::span<const BtfelTable* const> more) {
   TESSERA_ASSIGN_OR_RETURN(const std::unique_ptr<ViewPcaDecoder> decoder, ViewPcaDecoder::Create(table));
   const Layout layout{decoder->num_eigen_textures()};
   const size_t k = static_cast<size_t>(table.num_coefficients);
   if (table.codes.size() % k != 0) {
     return absl::InvalidArgumentError(
         absl::StrCat(table.codes.size(), " codes are not a multiple of ", k, " coefficients"));
+  }
+  TESSERA_RETURN_IF_ERROR(CheckSameCoefficients(table, more));
+  for (const BtfelTable* const other : more) {
+    if (other->offset != table.offset || other->step != table.step) {
+      return absl::InvalidArgumentError("further BTFels of view-pca have another quantisation");
+    }
   }
   CodecGlsl glsl;
   glsl.source = Source(layout);
@@ -223,15 +243,10 @@ absl::StatusOr<CodecGlsl> ViewPcaGlsl(const BtfelTable& table) {
 
   const int view_words = 4 * layout.btfel_view_texels();
   glsl.words_per_btfel = decoder->num_views() * view_words;
-  glsl.btfel_words.resize(table.size() * glsl.words_per_btfel);
-  uint32_t* words = glsl.btfel_words.data();
-  const uint8_t* codes = table.codes.data();
-  for (size_t i = 0; i < table.size() * decoder->num_views(); ++i) {
-    for (int n = 0; n < layout.view_codes(); ++n) {
-      words[n / 4] |= static_cast<uint32_t>(codes[n]) << (8 * (n % 4));
-    }
-    words += view_words;
-    codes += layout.view_codes();
+  glsl.btfel_words.resize(TotalSize(table, more) * glsl.words_per_btfel);
+  uint32_t* words = PackBtfels(table, layout, glsl.btfel_words.data());
+  for (const BtfelTable* const other : more) {
+    words = PackBtfels(*other, layout, words);
   }
   return glsl;
 }

@@ -1,6 +1,8 @@
 // The decoder of "view-pca" as GLSL, with the tables it reads. Same semantics as ViewPcaDecoder.
 #pragma once
 
+#include <span>
+
 #include <absl/status/statusor.h>
 
 #include "btf/codec/btfel_table.h"
@@ -11,6 +13,7 @@ namespace tessera {
 // The source depends only on the number of eigen-textures, so that a compiled program serves many materials.
 // Each view's codes start at a texel of four words. Errors: INVALID_ARGUMENT as ViewPcaDecoder::Create, or
 // when the codes are not whole BTFels.
-[[nodiscard]] absl::StatusOr<CodecGlsl> ViewPcaGlsl(const BtfelTable& table);
+[[nodiscard]] absl::StatusOr<CodecGlsl> ViewPcaGlsl(const BtfelTable& table,
+                                                    std::span<const BtfelTable* const> more = {});
 
 }  // namespace tessera

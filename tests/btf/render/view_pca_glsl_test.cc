@@ -23,7 +23,7 @@ TEST(ViewPcaGlslTest, BlendsWhatTheDecoderBlends) {
   const std::vector<Direction> lights = RingDirections(4, 12, 60.0);
   for (const int c : {1, 4, 5, 36}) {
     const BtfelTable table = Encoded(c, views, lights);
-    const auto glsl = FindCodec("view-pca")->Glsl(table);
+    const auto glsl = FindCodec("view-pca")->Glsl(table, {});
     ASSERT_TRUE(glsl.ok()) << glsl.status();
     SCOPED_TRACE(c);
     testing::ExpectBlendsWhatTheDecoderBlends(table, *glsl, 2e-5);
@@ -40,7 +40,7 @@ TEST(ViewPcaGlslTest, FewDirections) {
   const std::vector<Direction> two = {{0.8, 1.0}, {1.2, 4.0}};
   for (const auto& [views, lights] : {std::pair(one, line), {line, two}, {two, one}}) {
     const BtfelTable table = Encoded(3, views, lights);
-    const auto glsl = FindCodec("view-pca")->Glsl(table);
+    const auto glsl = FindCodec("view-pca")->Glsl(table, {});
     ASSERT_TRUE(glsl.ok()) << glsl.status();
     testing::ExpectBlendsWhatTheDecoderBlends(table, *glsl, 2e-5);
   }
