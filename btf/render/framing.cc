@@ -1,7 +1,9 @@
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "btf/render/preview.h"
+#include "btf/render/preview_scene.h"
 
 namespace tessera {
 
@@ -38,6 +40,35 @@ Camera FramingCamera(const QuadMesh& mesh, int width, int height) {
   camera.eye = camera.target + distance * back;
   camera.up = {0.0, 1.0, 0.0};
   return camera;
+}
+
+double TexelsPerPixel(const PreviewScene& scene) {
+  const QuadMesh& mesh = scene.dressing->mesh;
+  if (mesh.quads.empty()) {
+    return 0.0;
+  }
+  const ViewFrame view = MakeViewFrame(scene.camera, TriangulateSurface(mesh));
+  const double focal_pixels = 0.5 * scene.height / view.tan_half_fov_y;
+  double pixels = 0.0;
+  double faces = 0.0;
+  for (const Quad& quad : mesh.quads) {
+    std::array<Eigen::Vector2d, 4> p;
+    bool is_before_eye = true;
+    for (int k = 0; k < 4; ++k) {
+      const Eigen::Vector3d from_eye = mesh.positions[quad[k]].cast<double>() - view.eye;
+      const double depth = -from_eye.dot(view.back);
+      is_before_eye = is_before_eye && depth > view.near;
+      p[k] = focal_pixels / depth * Eigen::Vector2d(from_eye.dot(view.right), from_eye.dot(view.up));
+    }
+    const Eigen::Vector2d a = p[2] - p[0];
+    const Eigen::Vector2d b = p[3] - p[1];
+    const double area = 0.5 * (a.x() * b.y() - a.y() * b.x());
+    if (is_before_eye && area > 0.0) {
+      pixels += area;
+      faces += 1.0;
+    }
+  }
+  return pixels > 0.0 ? scene.tile_set->tile_size * std::sqrt(faces / pixels) : 0.0;
 }
 
 }  // namespace tessera

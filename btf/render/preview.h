@@ -14,6 +14,7 @@
 #include "btf/base/run_context.h"
 #include "btf/image/image.h"
 #include "btf/math/conventions.h"
+#include "btf/mips/tile_mips.h"
 #include "btf/wang/dressing.h"
 #include "btf/wang/tile_set.h"
 
@@ -44,6 +45,8 @@ enum class Filter { kBilinear, kNearest };
 struct PreviewScene {
   const Dressing* dressing = nullptr;
   const TileSet* tile_set = nullptr;
+  // Of tile_set, or none: what Filter::kBilinear shows where texels are smaller than pixels.
+  const TileMips* mips = nullptr;
   Camera camera;
   std::vector<Light> lights{Light{}};
   int width = 640;   // 16..8192
@@ -58,19 +61,20 @@ struct PreviewScene {
 // each picture costs only its drawing. One thread at a time; not while another uses the context.
 class GlPreview {
  public:
-  // The context, the dressing and the tile set must outlive it, unchanged. Cost: packing and copying the
-  // BTFels, and what the codec makes of its tables; preview_bench prints it. Errors: INVALID_ARGUMENT (mesh,
-  // codec's tables), FAILED_PRECONDITION (arrangements differ), UNIMPLEMENTED (codec unknown),
-  // RESOURCE_EXHAUSTED (tables beyond what GL holds), INTERNAL (GL).
+  // The context, the dressing, the tile set and its mips, which may be none, must outlive it, unchanged.
+  // Cost: packing and copying the BTFels, and what the codec makes of its tables; preview_bench prints it.
+  // Errors: INVALID_ARGUMENT (mesh, codec's tables), FAILED_PRECONDITION (arrangements differ), UNIMPLEMENTED
+  // (codec unknown), RESOURCE_EXHAUSTED (tables beyond what GL holds), INTERNAL (GL).
   [[nodiscard]] static absl::StatusOr<std::unique_ptr<GlPreview>> Create(OffscreenContext& context,
                                                                          const Dressing& dressing,
-                                                                         const TileSet& tile_set);
+                                                                         const TileSet& tile_set,
+                                                                         const TileMips* mips = nullptr);
   ~GlPreview();
   GlPreview(const GlPreview&) = delete;
   GlPreview& operator=(const GlPreview&) = delete;
 
-  // As RenderGl. Errors: also INVALID_ARGUMENT when the scene shows another dressing or tile set. The first
-  // picture of a codec's size on a context also compiles its shaders.
+  // As RenderGl. Errors: also INVALID_ARGUMENT when the scene shows another dressing, tile set or mips. The
+  // first picture of a codec's size on a context also compiles its shaders.
   [[nodiscard]] absl::StatusOr<Image> Render(const PreviewScene& scene, const RunContext& run_context);
 
   class Resources;
@@ -91,6 +95,11 @@ class GlPreview {
 // not be in use by another thread. For a single picture: GlPreview draws further ones faster.
 [[nodiscard]] absl::StatusOr<Image> RenderGl(OffscreenContext& context, const PreviewScene& scene,
                                              const RunContext& run_context);
+
+// How many texels of the tile set lie along the side of a pixel, on the mean over the faces that look at the
+// eye, hidden or not; 0 where none does. The scene as RenderGl wants it. Above about 2 mip levels show less
+// noise than the four samples of a pixel.
+[[nodiscard]] double TexelsPerPixel(const PreviewScene& scene);
 
 // The same picture in double precision on the CPU: slow, for tests.
 [[nodiscard]] absl::StatusOr<Image> RenderReference(const PreviewScene& scene, const RunContext& run_context);

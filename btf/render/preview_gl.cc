@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
 #include <cstddef>
 #include <memory>
@@ -118,11 +119,12 @@ absl::Status Targets::Allocate(const GlState& state, int band_width, int band_ro
 // What all pictures of a tile set on a dressing have in common, in GL.
 class GlPreview::Resources {
  public:
-  Resources(GlState& state, const Dressing& dressing, const TileSet& tile_set)
+  Resources(GlState& state, const Dressing& dressing, const TileSet& tile_set, const TileMips* mips)
       : state(state),
         gl(state.gl),
         dressing(dressing),
         tile_set(tile_set),
+        mips(mips),
         triangles(TriangulateSurface(dressing.mesh)),
         face_corners(gl),
         face_links(gl),
@@ -142,6 +144,8 @@ class GlPreview::Resources {
   const GladGLContext& gl;
   const Dressing& dressing;
   const TileSet& tile_set;
+  const TileMips* mips;
+  std::vector<GLint> level_begin;  // in tile_index, of each level from 0 on
   const SurfaceTriangles triangles;
   BufferTexture face_corners;
   BufferTexture face_links;
@@ -158,6 +162,7 @@ class GlPreview::Resources {
 
  private:
   absl::Status FillSurface(const DressedSurface& surface);
+  absl::Status FillTexels();
 };
 
 absl::Status GlPreview::Resources::FillSurface(const DressedSurface& surface) {
@@ -196,7 +201,36 @@ absl::Status GlPreview::Resources::FillSurface(const DressedSurface& surface) {
   }
   TESSERA_RETURN_IF_ERROR(
       face_links.Fill(std::span<const int32_t>(links), GL_RGBA32I, 4, "links of the mesh"));
-  return tile_index.Fill(std::span<const uint32_t>(tile_set.tile_index), GL_R32UI, 1, "tiles' texels");
+  return FillTexels();
+}
+
+absl::Status GlPreview::Resources::FillTexels() {
+  if (mips == nullptr) {
+    return tile_index.Fill(std::span<const uint32_t>(tile_set.tile_index), GL_R32UI, 1, "tiles' texels");
+  }
+  // A texel or a part of one, then its weight; BTFels numbered on from level to level.
+  std::vector<uint32_t> parts;
+  const auto add = [&parts](uint32_t texel, float weight) {
+    parts.insert(parts.end(), {texel, std::bit_cast<uint32_t>(weight)});
+  };
+  level_begin = {0};
+  for (const uint32_t texel : tile_set.tile_index) {
+    add(texel, 1.0F);
+  }
+  uint64_t first_btfel = tile_set.btfels.size();
+  for (const MipLevel& level : mips->levels) {
+    level_begin.push_back(static_cast<GLint>(parts.size() / 2));
+    for (const MipPart& part : level.parts) {
+      add(PackTexel(static_cast<uint32_t>(first_btfel) + BtfelOfTexel(part.texel), TurnsOfTexel(part.texel)),
+          part.weight);
+    }
+    first_btfel += level.btfels.size();
+  }
+  if (first_btfel > BtfelOfTexel(~0U)) {
+    return absl::ResourceExhaustedError(
+        absl::StrCat(first_btfel, " BTFels with mip levels, at most ", BtfelOfTexel(~0U)));
+  }
+  return tile_index.Fill(std::span<const uint32_t>(parts), GL_RG32UI, 2, "tiles' texels");
 }
 
 absl::Status GlPreview::Resources::Fill(const DressedSurface& surface, const CodecGlsl& codec) {
@@ -351,6 +385,20 @@ void PreviewDrawing::Shade(const Light& light, bool is_first, int first_row, int
                                                 : light.place.normalized());
   const glm::vec3 irradiance = GlmFromEigen(light.irradiance / kPi);
   gl_.Uniform1i(location("tile_size"), resources_.tile_set.tile_size);
+  if (resources_.mips != nullptr) {
+    const auto set_axis = [&](const char* name, const Eigen::Vector3d& axis) {
+      const glm::vec3 value = GlmFromEigen(axis);
+      gl_.Uniform3fv(location(name), 1, &value[0]);
+    };
+    set_axis("view_right", view_.right);
+    set_axis("view_up", view_.up);
+    set_axis("view_back", view_.back);
+    gl_.Uniform1f(location("focal_pixels"), static_cast<float>(0.5 * scene_.height / view_.tan_half_fov_y));
+    gl_.Uniform1i(location("parts_per_texel"), resources_.mips->parts_per_texel);
+    gl_.Uniform1i(location("num_levels"), static_cast<GLint>(resources_.mips->levels.size()));
+    gl_.Uniform1iv(location("level_begin"), static_cast<GLsizei>(resources_.level_begin.size()),
+                   resources_.level_begin.data());
+  }
   gl_.Uniform3fv(location("eye"), 1, &eye[0]);
   gl_.Uniform4f(location("light"), place.x, place.y, place.z, is_point ? 1.0f : 0.0f);
   gl_.Uniform3fv(location("irradiance_by_pi"), 1, &irradiance[0]);
@@ -363,7 +411,8 @@ absl::StatusOr<Image> PreviewDrawing::Draw(const RunContext& context) {
   // The codec's program first: when the context is full it drops all others.
   TESSERA_ASSIGN_OR_RETURN(
       shade_program_,
-      state.Program(FrameVertexShader(), ShadeFragmentShader(resources_.codec_source, scene_.filter)));
+      state.Program(FrameVertexShader(),
+                    ShadeFragmentShader(resources_.codec_source, scene_.filter, resources_.mips != nullptr)));
   TESSERA_ASSIGN_OR_RETURN(surface_program_, state.Program(SurfaceVertexShader(), SurfaceFragmentShader()));
   TESSERA_ASSIGN_OR_RETURN(empty_program_, state.Program(FrameVertexShader(), EmptySampleFragmentShader()));
   const int band_rows = std::clamp(kBandPixels / scene_.width, 1, scene_.height);
@@ -413,28 +462,33 @@ GlPreview::~GlPreview() {
 
 absl::StatusOr<std::unique_ptr<GlPreview>> GlPreview::Create(OffscreenContext& context,
                                                              const Dressing& dressing,
-                                                             const TileSet& tile_set) {
+                                                             const TileSet& tile_set, const TileMips* mips) {
   if (dressing.mesh.quads.empty()) {
     return absl::InvalidArgumentError("the dressing has no quads");
   }
-  TESSERA_ASSIGN_OR_RETURN(const DressedSurface surface, DressedSurface::Create(dressing, tile_set));
+  TESSERA_ASSIGN_OR_RETURN(const DressedSurface surface, DressedSurface::Create(dressing, tile_set, mips));
   const Codec* codec = FindCodec(tile_set.btfels.codec_id);
   if (codec == nullptr) {
     return absl::UnimplementedError(absl::StrCat("codec ", tile_set.btfels.codec_id, " is not known here"));
   }
-  TESSERA_ASSIGN_OR_RETURN(const CodecGlsl glsl, codec->Glsl(tile_set.btfels, {}));
+  std::vector<const BtfelTable*> levels;
+  for (int level = 1; level <= surface.num_mip_levels(); ++level) {
+    levels.push_back(&surface.btfels(level));
+  }
+  TESSERA_ASSIGN_OR_RETURN(const CodecGlsl glsl, codec->Glsl(tile_set.btfels, levels));
   const ScopedCurrent current(context);
   TESSERA_RETURN_IF_ERROR(current.status());
   TESSERA_ASSIGN_OR_RETURN(GlState* const state, context.gl_state());
-  auto resources = std::make_unique<Resources>(*state, dressing, tile_set);
+  auto resources = std::make_unique<Resources>(*state, dressing, tile_set, mips);
   TESSERA_RETURN_IF_ERROR(resources->Fill(surface, glsl));
   return absl::WrapUnique(new GlPreview(context, std::move(resources)));
 }
 
 absl::StatusOr<Image> GlPreview::Render(const PreviewScene& scene, const RunContext& run_context) {
   TESSERA_RETURN_IF_ERROR(CheckScene(scene));
-  if (scene.dressing != &resources_->dressing || scene.tile_set != &resources_->tile_set) {
-    return absl::InvalidArgumentError("the scene shows another dressing or tile set than the preview");
+  if (scene.dressing != &resources_->dressing || scene.tile_set != &resources_->tile_set ||
+      scene.mips != resources_->mips) {
+    return absl::InvalidArgumentError("the scene shows another dressing, tile set or mips than the preview");
   }
   const ScopedCurrent current(context_);
   TESSERA_RETURN_IF_ERROR(current.status());
@@ -445,7 +499,7 @@ absl::StatusOr<Image> RenderGl(OffscreenContext& context, const PreviewScene& sc
                                const RunContext& run_context) {
   TESSERA_RETURN_IF_ERROR(CheckScene(scene));
   TESSERA_ASSIGN_OR_RETURN(const std::unique_ptr<GlPreview> preview,
-                           GlPreview::Create(context, *scene.dressing, *scene.tile_set));
+                           GlPreview::Create(context, *scene.dressing, *scene.tile_set, scene.mips));
   return preview->Render(scene, run_context);
 }
 

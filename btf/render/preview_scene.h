@@ -6,6 +6,10 @@
 //   bilinearly, when they lie within kBilinearRadiusTexels of their mean (up to two texels a pixel);
 //   else as the mean of the texels that the samples lie in, which filters what a footprint of 2 x 2 texels
 //   would miss.
+// With mip levels, instead of the two, by bilinear footprints of one or two levels at the mean. How many
+// texels a pixel covers there follows from the derivatives of (s, q) by the pixel's place: an ellipse whose
+// longer axis may count at most kMipAnisotropy times the shorter one. The level is log2 of that number less
+// kMipBias, between the tile set itself (0) and its coarsest level.
 // With Filter::kNearest a group shows the one texel that its mean lies in.
 // The pixel is the mean over its covered samples; alpha is their share.
 #pragma once
@@ -27,6 +31,13 @@ inline constexpr std::array<std::array<double, 2>, kSamplesPerPixel> kSampleOffs
     {{-0.125, -0.375}, {0.375, -0.125}, {-0.375, 0.125}, {0.125, 0.375}}};
 // The samples lie 0.395 pixels from the centre: 0.8 texels are reached at two texels a pixel.
 inline constexpr double kBilinearRadiusTexels = 0.8;
+
+// A bilinear footprint at level l spreads by 4^l / 4 (variance, in texels), a pixel that covers n texels by
+// n^2 / 12, beside the 1 / 6 of the bilinear texels that it covers: with this bias the same for n = 2, a
+// little more beyond. More anisotropy would let what lies along the longer axis alias, less would blur what
+// lies along the shorter one.
+inline constexpr double kMipBias = 0.5;
+inline constexpr double kMipAnisotropy = 2.0;
 
 inline constexpr int kLeastPreviewSide = 16;
 inline constexpr int kMostPreviewSide = 8192;

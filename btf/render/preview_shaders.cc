@@ -52,11 +52,11 @@ void main() {
 // llvmpipe runs both sides of every `if`, under a mask, and leaves a loop at its end only, when no pixel of
 // eight goes on: a loop that is tested at its start runs once more for nothing. Hence `do`, and kNearest is a
 // constant of the source.
-constexpr char kShadeFragment[] = R"(
+constexpr char kShadeHead[] = R"(
 uniform usampler2DArray surface_samples;
 uniform samplerBuffer face_corners;  // 8 a face: four positions, four normals
 uniform isamplerBuffer face_links;   // 2 a face: faces across the tile's sides; (tile, turns, sides, turns)
-uniform usamplerBuffer tile_index;
+uniform usamplerBuffer tile_index;  // texels; with mip levels (part, weight), level after level
 uniform int tile_size;
 uniform vec3 eye;
 uniform vec4 light;  // w = 0: unit direction to it, 1: its position
@@ -89,12 +89,21 @@ vec3 Proposal(vec3 edge, vec3 n, int side) {
   return (side & 2) != 0 ? -odd : odd;
 }
 
-// The texel of a tile position, one step beyond a side allowed: (BTFel, turns).
-ivec2 Texel(int face, ivec4 links, ivec2 at) {
+// Tiles w texels wide at `begin` of tile_index, of which part `part` of `parts` is looked at.
+struct Level {
+  int w;
+  int begin;
+  int parts;
+  int part;
+};
+
+// The texel of a tile position, one step beyond a side allowed: (BTFel, turns); its weight.
+ivec2 Texel(int face, ivec4 links, ivec2 at, Level level, out float weight) {
+  int w = level.w;
   int side = -1, position = 0;
-  if (at.y >= tile_size) { side = 0; position = at.x; }
-  else if (at.x >= tile_size) { side = 1; position = tile_size - 1 - at.y; }
-  else if (at.y < 0) { side = 2; position = tile_size - 1 - at.x; }
+  if (at.y >= w) { side = 0; position = at.x; }
+  else if (at.x >= w) { side = 1; position = w - 1 - at.y; }
+  else if (at.y < 0) { side = 2; position = w - 1 - at.x; }
   else if (at.x < 0) { side = 3; position = at.y; }
   int turns = 0;
   int tile = links.x;
@@ -105,16 +114,128 @@ ivec2 Texel(int face, ivec4 links, ivec2 at) {
       tile = texelFetch(face_links, 2 * across + 1).x;
       turns = (links.w >> (2 * side)) & 3;
       int other = (links.z >> (2 * side)) & 3;
-      int back = tile_size - 1;
+      int back = w - 1;
       int p = back - position;
       at = other == 0 ? ivec2(p, back) : other == 1 ? ivec2(back, back - p)
          : other == 2 ? ivec2(back - p, 0) : ivec2(0, p);
     }
   }
-  at = clamp(at, ivec2(0), ivec2(tile_size - 1));
-  uint texel = texelFetch(tile_index, (tile * tile_size + at.y) * tile_size + at.x).x;
-  return ivec2(int(texel & 0x3fffffffu), (int(texel >> 30) + turns) & 3);
+  at = clamp(at, ivec2(0), ivec2(w - 1));
+  uvec2 texel = texelFetch(tile_index, level.begin + ((tile * w + at.y) * w + at.x) * level.parts + level.part).xy;
+  weight = kHasMips ? uintBitsToFloat(texel.y) : 1.0;
+  return ivec2(int(texel.x & 0x3fffffffu), (int(texel.x >> 30) + turns) & 3);
 }
+
+// The bilinear footprint at st: BTFels, turns and weights.
+void Footprint(int face, ivec4 links, vec2 st, Level level, out ivec4 btfels, out ivec4 turns, out vec4 weights) {
+  vec2 uv = clamp(Unturned(st - 0.5, links.y) + 0.5, 0.0, 1.0);
+  vec2 at = vec2(uv.x, 1.0 - uv.y) * float(level.w) - 0.5;
+  ivec2 first = ivec2(floor(at));
+  vec2 f = at - vec2(first);
+  ivec2 second = first + 1;
+  weights = vec4((1.0 - f.x) * (1.0 - f.y), f.x * (1.0 - f.y), (1.0 - f.x) * f.y, f.x * f.y);
+  ivec2 at0 = first, at1 = ivec2(second.x, first.y), at2 = ivec2(first.x, second.y), at3 = second;
+  bvec2 below = lessThan(first, ivec2(0));
+  if ((below.x || second.x >= level.w) && (below.y || second.y >= level.w)) {
+    // Beyond a vertex: the own corner texel and the two across its sides.
+    ivec2 own = clamp(first, ivec2(0), ivec2(level.w - 1));
+    vec2 crossing = vec2(below.x ? 1.0 - f.x : f.x, below.y ? 1.0 - f.y : f.y);
+    vec2 share = crossing * max(0.5 - crossing.yx, 0.0);
+    float h = share.x + share.y > 0.0 ? share.x / (share.x + share.y) : 0.5;
+    vec2 across = crossing * vec2(h, 1.0 - h);
+    at0 = own;
+    at1 = ivec2(below.x ? -1 : level.w, own.y);
+    at2 = ivec2(own.x, below.y ? -1 : level.w);
+    at3 = own;
+    weights = vec4(1.0 - across.x - across.y, across.x, across.y, 0.0);
+  }
+  vec4 share;
+  ivec2 x0 = Texel(face, links, at0, level, share.x), x1 = Texel(face, links, at1, level, share.y);
+  ivec2 x2 = Texel(face, links, at2, level, share.z), x3 = Texel(face, links, at3, level, share.w);
+  btfels = ivec4(x0.x, x1.x, x2.x, x3.x);
+  turns = ivec4(x0.y, x1.y, x2.y, x3.y);
+  weights *= share;
+}
+)";
+
+// The blended value of a group, unclamped: vec3 Filtered(face, links, st, members, samples, position, ds, dq,
+// light, view), `members` and `samples` as Shade has them, ds and dq the changes of `position` with st.
+constexpr char kFilterTexels[] = R"(
+vec3 Filtered(int face, ivec4 links, vec2 st, int members, mat4x2 samples, vec3 position, vec3 ds, vec3 dq,
+              vec3 light, vec3 view) {
+  Level level = Level(tile_size, 0, 1, 0);
+  ivec4 btfels = ivec4(0), turns = ivec4(0);
+  vec4 weights = vec4(0.0);
+  if (members == 0) {
+    Footprint(face, links, st, level, btfels, turns, weights);
+  } else {
+    int i = 0;
+    do {
+      vec2 uv = Unturned(samples[i] - 0.5, links.y) + 0.5;
+      ivec2 at = clamp(ivec2(floor(vec2(uv.x, 1.0 - uv.y) * float(tile_size) + kNearestShiftTexels)), ivec2(0),
+                       ivec2(tile_size - 1));
+      float share;
+      ivec2 x = Texel(face, links, at, level, share);
+      btfels[i] = x.x;
+      turns[i] = x.y;
+      weights[i] = 1.0 / float(members);
+    } while (++i < members);
+  }
+  // The sum is linear before its clamp, so blending as coefficients and after decoding are the same.
+  return BlendBtfels(btfels, turns, weights, members == 0 ? 4 : members, light, view);
+}
+)";
+
+// A footprint in the level below and one in that above the right one, part by part.
+constexpr char kFilterMips[] = R"(
+uniform vec3 view_right;
+uniform vec3 view_up;
+uniform vec3 view_back;
+uniform float focal_pixels;
+uniform int num_levels;
+uniform int parts_per_texel;
+uniform int level_begin[kMostLevels];
+
+float MipLevelAt(vec3 position, vec3 ds, vec3 dq) {
+  vec3 from_eye = position - eye;
+  float depth = -dot(from_eye, view_back);
+  vec2 back = vec2(dot(view_back, ds), dot(view_back, dq));
+  float scale = focal_pixels / (depth * depth);
+  vec2 x = scale * (depth * vec2(dot(view_right, ds), dot(view_right, dq)) + dot(from_eye, view_right) * back);
+  vec2 y = scale * (depth * vec2(dot(view_up, ds), dot(view_up, dq)) + dot(from_eye, view_up) * back);
+  // The singular values of the matrix with rows x and y: half a sum and half a difference of two lengths.
+  float sum = length(vec2(x.x + y.y, x.y - y.x)), difference = length(vec2(x.x - y.y, x.y + y.x));
+  float longest = max(0.5 * (sum + difference), 1e-12);
+  float determinant = max(abs(x.x * y.y - x.y * y.x), 1e-12 * longest * longest);
+  float texels = float(tile_size) * max(1.0 / longest, longest / determinant / kMipAnisotropy);
+  return clamp(log2(texels) - kMipBias, 0.0, float(num_levels));
+}
+
+vec3 Filtered(int face, ivec4 links, vec2 st, int members, mat4x2 samples, vec3 position, vec3 ds, vec3 dq,
+              vec3 light, vec3 view) {
+  float at = MipLevelAt(position, ds, dq);
+  int below = int(at);
+  float share_above = at - float(below);
+  int parts_below = below == 0 ? 1 : parts_per_texel;
+  int end = share_above > 0.0 ? parts_below + parts_per_texel : parts_below;
+  vec3 sum = vec3(0.0);
+  int i = 0;
+  do {
+    bool is_below = i < parts_below;
+    int number = is_below ? below : below + 1;
+    Level level = Level(tile_size >> number, level_begin[number], number == 0 ? 1 : parts_per_texel,
+                        is_below ? i : i - parts_below);
+    ivec4 btfels, turns;
+    vec4 weights;
+    Footprint(face, links, st, level, btfels, turns, weights);
+    weights *= is_below ? 1.0 - share_above : share_above;
+    sum += BlendBtfels(btfels, turns, weights, weights == vec4(0.0) ? 0 : 4, light, view);
+  } while (++i < end);
+  return sum;
+}
+)";
+
+constexpr char kShadeTail[] = R"(
 
 // Value times irradiance / pi at a point of the front of a face. members: how many of `samples` to read as
 // single texels, 0 for a bilinear footprint at st.
@@ -155,49 +276,8 @@ vec3 Shade(int face, vec2 st, int members, mat4x2 samples) {
     local_view = normalize(vec3(local_view.xy, kLeastViewCosine));
   }
 
-  ivec4 btfels = ivec4(0), turns = ivec4(0);
-  vec4 weights = vec4(0.0);
-  if (members == 0) {
-    vec2 uv = clamp(Unturned(st - 0.5, links.y) + 0.5, 0.0, 1.0);
-    vec2 at = vec2(uv.x, 1.0 - uv.y) * float(tile_size) - 0.5;
-    ivec2 first = ivec2(floor(at));
-    vec2 f = at - vec2(first);
-    ivec2 second = first + 1;
-    weights = vec4((1.0 - f.x) * (1.0 - f.y), f.x * (1.0 - f.y), (1.0 - f.x) * f.y, f.x * f.y);
-    ivec2 at0 = first, at1 = ivec2(second.x, first.y), at2 = ivec2(first.x, second.y), at3 = second;
-    bvec2 below = lessThan(first, ivec2(0));
-    if ((below.x || second.x >= tile_size) && (below.y || second.y >= tile_size)) {
-      // Beyond a vertex: the own corner texel and the two across its sides.
-      ivec2 own = clamp(first, ivec2(0), ivec2(tile_size - 1));
-      vec2 crossing = vec2(below.x ? 1.0 - f.x : f.x, below.y ? 1.0 - f.y : f.y);
-      vec2 share = crossing * max(0.5 - crossing.yx, 0.0);
-      float h = share.x + share.y > 0.0 ? share.x / (share.x + share.y) : 0.5;
-      vec2 across = crossing * vec2(h, 1.0 - h);
-      at0 = own;
-      at1 = ivec2(below.x ? -1 : tile_size, own.y);
-      at2 = ivec2(own.x, below.y ? -1 : tile_size);
-      at3 = own;
-      weights = vec4(1.0 - across.x - across.y, across.x, across.y, 0.0);
-    }
-    ivec2 x0 = Texel(face, links, at0), x1 = Texel(face, links, at1);
-    ivec2 x2 = Texel(face, links, at2), x3 = Texel(face, links, at3);
-    btfels = ivec4(x0.x, x1.x, x2.x, x3.x);
-    turns = ivec4(x0.y, x1.y, x2.y, x3.y);
-  } else {
-    int i = 0;
-    do {
-      vec2 uv = Unturned(samples[i] - 0.5, links.y) + 0.5;
-      ivec2 at = clamp(ivec2(floor(vec2(uv.x, 1.0 - uv.y) * float(tile_size) + kNearestShiftTexels)), ivec2(0),
-                       ivec2(tile_size - 1));
-      ivec2 x = Texel(face, links, at);
-      btfels[i] = x.x;
-      turns[i] = x.y;
-      weights[i] = 1.0 / float(members);
-    } while (++i < members);
-  }
-
-  // The sum is linear before its clamp, so blending as coefficients and after decoding are the same.
-  vec3 value = BlendBtfels(btfels, turns, weights, members == 0 ? 4 : members, local_light, local_view);
+  vec3 value = Filtered(face, links, st, members, samples, position, mix(p1 - p0, p2 - p3, st.y),
+                        mix(p3 - p0, p2 - p1, st.x), local_light, local_view);
   return max(value, vec3(0.0)) * irradiance_by_pi * falloff;
 }
 
@@ -262,14 +342,19 @@ std::string EmptySampleFragmentShader() {
   return kEmptySampleFragment;
 }
 
-std::string ShadeFragmentShader(const std::string& codec_source, Filter filter) {
+std::string ShadeFragmentShader(const std::string& codec_source, Filter filter, bool has_mips) {
   static_assert(kSamplesPerPixel == 4, "the shader unpacks four samples");
+  const bool is_nearest = filter == Filter::kNearest;
   return absl::StrCat("#version 450 core\n",
                       absl::StrFormat("const float kLeastViewCosine = %.9e;\n", kLeastViewCosine),
                       absl::StrFormat("const float kNearestShiftTexels = %.9e;\n", kNearestShiftTexels),
                       absl::StrFormat("const float kBilinearRadiusTexels = %.9e;\n", kBilinearRadiusTexels),
-                      "const bool kNearest = ", filter == Filter::kNearest ? "true" : "false", ";\n",
-                      codec_source, kShadeFragment);
+                      absl::StrFormat("const float kMipBias = %.9e;\n", kMipBias),
+                      absl::StrFormat("const float kMipAnisotropy = %.9e;\n", kMipAnisotropy),
+                      "const int kMostLevels = ", kMostMipLevels + 1, ";\n",
+                      "const bool kNearest = ", is_nearest ? "true" : "false", ";\n",
+                      "const bool kHasMips = ", has_mips ? "true" : "false", ";\n", codec_source, kShadeHead,
+                      has_mips && !is_nearest ? kFilterMips : kFilterTexels, kShadeTail);
 }
 
 }  // namespace tessera

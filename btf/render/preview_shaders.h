@@ -16,7 +16,7 @@ namespace tessera {
 [[nodiscard]] std::string FrameVertexShader();
 // Nothing; drawn over the whole frame.
 [[nodiscard]] std::string EmptySampleFragmentShader();
-// `codec_source` is CodecGlsl::source.
-[[nodiscard]] std::string ShadeFragmentShader(const std::string& codec_source, Filter filter);
+// `codec_source` is CodecGlsl::source; `has_mips`: mip levels stand behind the tile set's texels.
+[[nodiscard]] std::string ShadeFragmentShader(const std::string& codec_source, Filter filter, bool has_mips);
 
 }  // namespace tessera

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include <Eigen/Geometry>
+#include <Eigen/SVD>
 
 #include "btf/base/parallel.h"
 #include "btf/base/status_macros.h"
@@ -125,8 +126,9 @@ void DrawTriangle(const SurfaceTriangles& triangles, size_t first_index, const R
 
 class Shader {
  public:
-  Shader(const PreviewScene& scene, const DressedSurface& surface, const Decoder& decoder)
-      : scene_(scene), surface_(surface), decoder_(decoder) {}
+  Shader(const PreviewScene& scene, const DressedSurface& surface, const Decoder& decoder,
+         const ViewFrame& view)
+      : scene_(scene), surface_(surface), decoder_(decoder), view_(view) {}
 
   // Mean radiance of one group's samples, all on the front of one face.
   [[nodiscard]] Eigen::Array3d Radiance(std::span<const SurfacePoint> samples) const {
@@ -139,15 +141,18 @@ class Shader {
     for (const SurfacePoint& sample : samples) {
       radius = std::max(radius, std::hypot(sample.s - mean.s, sample.q - mean.q));
     }
-    Taps taps = {};
+    std::vector<Tap> taps;
     if (scene_.filter == Filter::kNearest) {
-      taps[0] = surface_.NearestTap(mean);
+      taps = {surface_.NearestTap(mean)};
+    } else if (scene_.mips != nullptr) {
+      taps = surface_.MipTaps(mean, LevelAt(mean));
     } else if (radius * surface_.tile_set().tile_size <= kBilinearRadiusTexels) {
-      taps = surface_.BilinearTaps(mean);
+      const Taps bilinear = surface_.BilinearTaps(mean);
+      taps.assign(bilinear.begin(), bilinear.end());
     } else {
-      for (size_t i = 0; i < samples.size(); ++i) {
-        taps[i] = surface_.NearestTap(samples[i]);
-        taps[i].weight = 1.0 / static_cast<double>(samples.size());
+      for (const SurfacePoint& sample : samples) {
+        taps.push_back(surface_.NearestTap(sample));
+        taps.back().weight = 1.0 / static_cast<double>(samples.size());
       }
     }
     const SurfaceFrame frame = surface_.FrameAt(mean);
@@ -167,9 +172,31 @@ class Shader {
   }
 
  private:
+  // The mip level that shows a pixel's share of the surface as about one texel; infinite edge on.
+  [[nodiscard]] double LevelAt(const SurfacePoint& point) const {
+    const Eigen::Vector3d from_eye = surface_.PositionAt(point) - view_.eye;
+    const Eigen::Matrix<double, 3, 2> tangents = surface_.TangentsAt(point);
+    const double depth = -from_eye.dot(view_.back);
+    // Pixels by (s, q): the derivatives of x / depth and y / depth.
+    const double focal_pixels = 0.5 * scene_.height / view_.tan_half_fov_y;
+    const auto row = [&](const Eigen::Vector3d& axis) -> Eigen::RowVector2d {
+      return focal_pixels / (depth * depth) *
+             (depth * axis.transpose() * tangents + from_eye.dot(axis) * view_.back.transpose() * tangents);
+    };
+    Eigen::Matrix2d pixels;
+    pixels.row(0) = row(view_.right);
+    pixels.row(1) = row(view_.up);
+    const Eigen::Vector2d axes = pixels.jacobiSvd().singularValues();
+    const double w = surface_.tile_set().tile_size;
+    const double shorter = w / axes[0];
+    const double longer = w / axes[1];
+    return std::log2(std::max(shorter, longer / kMipAnisotropy)) - kMipBias;
+  }
+
   const PreviewScene& scene_;
   const DressedSurface& surface_;
   const Decoder& decoder_;
+  const ViewFrame& view_;
 };
 
 }  // namespace
@@ -178,12 +205,12 @@ absl::StatusOr<ReferencePicture> RenderReferenceWithDepth(const PreviewScene& sc
                                                           const RunContext& context) {
   TESSERA_RETURN_IF_ERROR(CheckScene(scene));
   TESSERA_ASSIGN_OR_RETURN(const DressedSurface surface,
-                           DressedSurface::Create(*scene.dressing, *scene.tile_set));
+                           DressedSurface::Create(*scene.dressing, *scene.tile_set, scene.mips));
   TESSERA_ASSIGN_OR_RETURN(const std::unique_ptr<Decoder> decoder, MakeDecoder(scene.tile_set->btfels));
   const SurfaceTriangles triangles = TriangulateSurface(scene.dressing->mesh);
   const ViewFrame view = MakeViewFrame(scene.camera, triangles);
   const Rays rays(view, triangles.centre, scene.width, scene.height);
-  const Shader shader(scene, surface, *decoder);
+  const Shader shader(scene, surface, *decoder, view);
 
   ReferencePicture picture;
   picture.image = Image(scene.width, scene.height, 4);

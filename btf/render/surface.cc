@@ -1,7 +1,9 @@
 #include "btf/render/surface.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <optional>
 
 #include <absl/strings/str_cat.h>
 #include <Eigen/Geometry>
@@ -58,9 +60,32 @@ Eigen::Vector2d TileFromFace(double s, double q, int turns) {
   return {s, q};
 }
 
+absl::Status CheckMips(const TileSet& tile_set, const TileMips& mips) {
+  for (size_t i = 0; i < mips.levels.size(); ++i) {
+    const MipLevel& level = mips.levels[i];
+    const int side = level.tile_size;
+    const size_t parts = tile_set.tile_codes.size() * side * side * mips.parts_per_texel;
+    if (side < 1 || side << (i + 1) != tile_set.tile_size || level.parts.size() != parts ||
+        level.btfels.num_coefficients != tile_set.btfels.num_coefficients) {
+      return absl::InvalidArgumentError(
+          absl::StrCat("mip level ", i + 1, ": ", level.parts.size(), " parts in tiles of ", side, "x", side,
+                       " texels do not go with ", tile_set.tile_codes.size(), " tiles of ",
+                       tile_set.tile_size, "x", tile_set.tile_size));
+    }
+    for (const MipPart& part : level.parts) {
+      if (part.weight > 0.0F && BtfelOfTexel(part.texel) >= level.btfels.size()) {
+        return absl::InvalidArgumentError(absl::StrCat(
+            "mip level ", i + 1, " names BTFel ", BtfelOfTexel(part.texel), " of ", level.btfels.size()));
+      }
+    }
+  }
+  return absl::OkStatus();
+}
+
 }  // namespace
 
-absl::StatusOr<DressedSurface> DressedSurface::Create(const Dressing& dressing, const TileSet& tile_set) {
+absl::StatusOr<DressedSurface> DressedSurface::Create(const Dressing& dressing, const TileSet& tile_set,
+                                                      const TileMips* mips) {
   const QuadMesh& mesh = dressing.mesh;
   if (mesh.normals.size() != mesh.positions.size()) {
     return absl::InvalidArgumentError(absl::StrCat("the dressing has ", mesh.positions.size(),
@@ -90,6 +115,10 @@ absl::StatusOr<DressedSurface> DressedSurface::Create(const Dressing& dressing, 
                                                      num_btfels));
     }
   }
+  if (mips != nullptr) {
+    TESSERA_RETURN_IF_ERROR(CheckMips(tile_set, *mips));
+    surface.mips_ = mips;
+  }
   return surface;
 }
 
@@ -98,6 +127,16 @@ Eigen::Vector3d DressedSurface::PositionAt(const SurfacePoint& point) const {
   const Quad& quad = mesh.quads[point.face];
   const auto corner = [&](int k) -> Eigen::Vector3d { return mesh.positions[quad[k]].cast<double>(); };
   return Bilinear(corner(0), corner(1), corner(2), corner(3), point.s, point.q);
+}
+
+Eigen::Matrix<double, 3, 2> DressedSurface::TangentsAt(const SurfacePoint& point) const {
+  const QuadMesh& mesh = binding_.dressing->mesh;
+  const Quad& quad = mesh.quads[point.face];
+  const auto corner = [&](int k) -> Eigen::Vector3d { return mesh.positions[quad[k]].cast<double>(); };
+  Eigen::Matrix<double, 3, 2> tangents;
+  tangents.col(0) = (1.0 - point.q) * (corner(1) - corner(0)) + point.q * (corner(2) - corner(3));
+  tangents.col(1) = (1.0 - point.s) * (corner(3) - corner(0)) + point.s * (corner(2) - corner(1));
+  return tangents;
 }
 
 SurfaceFrame DressedSurface::FrameAt(const SurfacePoint& point) const {
@@ -141,8 +180,7 @@ SurfaceFrame DressedSurface::FrameAt(const SurfacePoint& point) const {
   return frame;
 }
 
-Tap DressedSurface::TapAt(int face, int x, int y) const {
-  const int w = binding_.tile_size;
+DressedSurface::Texel DressedSurface::TexelAt(int face, int x, int y, int w) const {
   int side = -1;
   int position = 0;
   if (y >= w) {
@@ -172,12 +210,10 @@ Tap DressedSurface::TapAt(int face, int x, int y) const {
       y = std::clamp(y, 0, w - 1);
     }
   }
-  const uint32_t texel = binding_.texels[face][static_cast<size_t>(y) * w + x];
-  return {BtfelOfTexel(texel), (TurnsOfTexel(texel) + turns) & 3, 1.0};
+  return {.face = face, .x = x, .y = y, .turns = turns};
 }
 
-Taps DressedSurface::BilinearTaps(const SurfacePoint& point) const {
-  const int w = binding_.tile_size;
+std::array<DressedSurface::Texel, 4> DressedSurface::BilinearTexels(const SurfacePoint& point, int w) const {
   const Eigen::Vector2d uv = TileFromFace(point.s, point.q, binding_.dressing->turns[point.face]);
   const double x = std::clamp(uv.x(), 0.0, 1.0) * w - 0.5;
   const double y = (1.0 - std::clamp(uv.y(), 0.0, 1.0)) * w - 0.5;
@@ -187,8 +223,8 @@ Taps DressedSurface::BilinearTaps(const SurfacePoint& point) const {
   const double fy = y - y0;
   const bool crosses_x = x0 < 0 || x0 + 1 >= w;
   const bool crosses_y = y0 < 0 || y0 + 1 >= w;
-  const auto tap = [&](int tx, int ty, double weight) {
-    Tap result = TapAt(point.face, tx, ty);
+  const auto texel = [&](int tx, int ty, double weight) {
+    Texel result = TexelAt(point.face, tx, ty, w);
     result.weight = weight;
     return result;
   };
@@ -202,11 +238,58 @@ Taps DressedSurface::BilinearTaps(const SurfacePoint& point) const {
     const double h = share_x + share_y > 0.0 ? share_x / (share_x + share_y) : 0.5;
     const double across_x = p * h;
     const double across_y = q * (1.0 - h);
-    return {tap(own_x, own_y, 1.0 - across_x - across_y), tap(x0 < 0 ? -1 : w, own_y, across_x),
-            tap(own_x, y0 < 0 ? -1 : w, across_y), Tap{}};
+    return {texel(own_x, own_y, 1.0 - across_x - across_y), texel(x0 < 0 ? -1 : w, own_y, across_x),
+            texel(own_x, y0 < 0 ? -1 : w, across_y), texel(own_x, own_y, 0.0)};
   }
-  return {tap(x0, y0, (1.0 - fx) * (1.0 - fy)), tap(x0 + 1, y0, fx * (1.0 - fy)),
-          tap(x0, y0 + 1, (1.0 - fx) * fy), tap(x0 + 1, y0 + 1, fx * fy)};
+  return {texel(x0, y0, (1.0 - fx) * (1.0 - fy)), texel(x0 + 1, y0, fx * (1.0 - fy)),
+          texel(x0, y0 + 1, (1.0 - fx) * fy), texel(x0 + 1, y0 + 1, fx * fy)};
+}
+
+Tap DressedSurface::TapOf(const Texel& texel) const {
+  const uint32_t entry =
+      binding_.texels[texel.face][static_cast<size_t>(texel.y) * binding_.tile_size + texel.x];
+  return {
+      .btfel = BtfelOfTexel(entry), .turns = (TurnsOfTexel(entry) + texel.turns) & 3, .weight = texel.weight};
+}
+
+Taps DressedSurface::BilinearTaps(const SurfacePoint& point) const {
+  Taps taps;
+  std::ranges::transform(BilinearTexels(point, binding_.tile_size), taps.begin(),
+                         [this](const Texel& texel) { return TapOf(texel); });
+  return taps;
+}
+
+void DressedSurface::AppendMipTaps(const SurfacePoint& point, int level, double weight,
+                                   std::vector<Tap>& taps) const {
+  const MipLevel& mip = mips_->levels[level - 1];
+  for (const Texel& texel : BilinearTexels(point, mip.tile_size)) {
+    const int tile = static_cast<int>(binding_.dressing->tile[texel.face]);
+    for (const MipPart& part : mip.texel(mips_->parts_per_texel, tile, texel.x, texel.y)) {
+      taps.push_back({.level = level,
+                      .btfel = BtfelOfTexel(part.texel),
+                      .turns = (TurnsOfTexel(part.texel) + texel.turns) & 3,
+                      .weight = weight * texel.weight * part.weight});
+    }
+  }
+}
+
+std::vector<Tap> DressedSurface::MipTaps(const SurfacePoint& point, double level) const {
+  const double clamped = std::clamp(level, 0.0, static_cast<double>(num_mip_levels()));
+  const int below = static_cast<int>(clamped);
+  const double share_above = clamped - below;
+  std::vector<Tap> taps;
+  if (below == 0) {
+    for (Tap tap : BilinearTaps(point)) {
+      tap.weight *= 1.0 - share_above;
+      taps.push_back(tap);
+    }
+  } else {
+    AppendMipTaps(point, below, 1.0 - share_above, taps);
+  }
+  if (share_above > 0.0) {
+    AppendMipTaps(point, below + 1, share_above, taps);
+  }
+  return taps;
 }
 
 Tap DressedSurface::NearestTap(const SurfacePoint& point) const {
@@ -214,12 +297,12 @@ Tap DressedSurface::NearestTap(const SurfacePoint& point) const {
   const Eigen::Vector2d uv = TileFromFace(point.s, point.q, binding_.dressing->turns[point.face]);
   const int x = std::clamp(static_cast<int>(std::floor(uv.x() * w + kNearestShiftTexels)), 0, w - 1);
   const int y = std::clamp(static_cast<int>(std::floor((1.0 - uv.y()) * w + kNearestShiftTexels)), 0, w - 1);
-  return TapAt(point.face, x, y);
+  return TapOf(TexelAt(point.face, x, y, w));
 }
 
 Eigen::Array3d ReflectanceOfTaps(const DressedSurface& surface, const Decoder& decoder,
-                                 const SurfaceFrame& frame, const Taps& taps, const Eigen::Vector3d& to_light,
-                                 const Eigen::Vector3d& to_eye) {
+                                 const SurfaceFrame& frame, std::span<const Tap> taps,
+                                 const Eigen::Vector3d& to_light, const Eigen::Vector3d& to_eye) {
   const Eigen::Vector3d light = frame.LocalFromWorld(to_light);
   Eigen::Vector3d view = frame.LocalFromWorld(to_eye);
   if (view.z() < kLeastViewCosine) {
@@ -228,11 +311,20 @@ Eigen::Array3d ReflectanceOfTaps(const DressedSurface& surface, const Decoder& d
   }
   Eigen::Array3d sum = Eigen::Array3d::Zero();
   std::vector<double> coefficients(decoder.num_coefficients());
+  std::array<std::optional<LinearForm>, 4> forms;  // by turns
   for (const Tap& tap : taps) {
     if (tap.weight > 0.0) {
-      decoder.Dequantize(surface.tile_set().btfels.btfel(tap.btfel), coefficients);
-      sum += tap.weight * decoder.Evaluate(coefficients, UnturnedFromTurned(light, tap.turns),
-                                           UnturnedFromTurned(view, tap.turns));
+      const BtfelTable& table = surface.btfels(tap.level);
+      const std::span<const uint8_t> codes = table.btfel(tap.btfel);
+      for (size_t i = 0; i < coefficients.size(); ++i) {
+        coefficients[i] =
+            static_cast<double>(table.offset[i]) + static_cast<double>(table.step[i]) * codes[i];
+      }
+      std::optional<LinearForm>& form = forms[tap.turns];
+      if (!form.has_value()) {
+        form = decoder.Form(UnturnedFromTurned(light, tap.turns), UnturnedFromTurned(view, tap.turns));
+      }
+      sum += tap.weight * form->ValueOf(coefficients);
     }
   }
   return sum.max(0.0);

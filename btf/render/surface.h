@@ -9,12 +9,14 @@
 #pragma once
 
 #include <array>
+#include <span>
 #include <vector>
 
 #include <absl/status/statusor.h>
 #include <Eigen/Core>
 
 #include "btf/codec/decoder.h"
+#include "btf/mips/tile_mips.h"
 #include "btf/wang/dressing.h"
 #include "btf/wang/neighbour.h"
 #include "btf/wang/redress.h"
@@ -40,8 +42,9 @@ struct SurfaceFrame {
   }
 };
 
-// One texel of a filter's footprint.
+// One texel of a filter's footprint, or one part of it.
 struct Tap {
+  int level = 0;  // 0: of the tile set itself, else of its mip level
   uint32_t btfel = 0;
   int turns = 0;        // of the BTFel as the frame of the point sees it: its own and its tile's
   double weight = 0.0;  // 0: not read
@@ -56,15 +59,19 @@ inline constexpr double kLeastViewCosine = 1e-3;
 // breaks such ties the same way everywhere, and is far from the fractions that pixels and texels form.
 inline constexpr double kNearestShiftTexels = 0.0037;
 
-// Immutable, safe to share between threads. Borrows the dressing and the tile set.
+// Immutable, safe to share between threads. Borrows the dressing, the tile set and its mip levels.
 class DressedSurface {
  public:
-  // Errors: those of Redress and BuildTileNeighbours; INVALID_ARGUMENT naming the vertex that is not finite
-  // or does not exist, or the texel whose BTFel does not exist.
+  // `mips` are those of `tile_set`, or none. Errors: those of Redress and BuildTileNeighbours;
+  // INVALID_ARGUMENT naming the vertex that is not finite or does not exist, the texel whose BTFel does not
+  // exist, or the mip level that does not go with the tile set.
   [[nodiscard]] static absl::StatusOr<DressedSurface> Create(const Dressing& dressing,
-                                                             const TileSet& tile_set);
+                                                             const TileSet& tile_set,
+                                                             const TileMips* mips = nullptr);
 
   [[nodiscard]] Eigen::Vector3d PositionAt(const SurfacePoint& point) const;
+  // Columns: how the position changes with s and with q.
+  [[nodiscard]] Eigen::Matrix<double, 3, 2> TangentsAt(const SurfacePoint& point) const;
 
   // Each side proposes a frame from its own edge, projected perpendicular to the interpolated normal and
   // turned by its side number; the four angles are blended with weights 1 / distance to the side. On a side
@@ -78,25 +85,51 @@ class DressedSurface {
   // so that on either side (p or q = 1/2) both faces read the same two texels with the same weights.
   [[nodiscard]] Taps BilinearTaps(const SurfacePoint& point) const;
 
+  // Bilinear footprints of the mip levels below and above `level` in [0, number of levels], blended; their
+  // texels lie at the same places of coarser tiles, and their neighbours across sides and vertices are found
+  // in the same way.
+  [[nodiscard]] std::vector<Tap> MipTaps(const SurfacePoint& point, double level) const;
+
   // The texel that the point, moved by kNearestShiftTexels along the tile's columns and rows, lies in.
   [[nodiscard]] Tap NearestTap(const SurfacePoint& point) const;
 
   [[nodiscard]] const Dressing& dressing() const { return *binding_.dressing; }
   [[nodiscard]] const TileSet& tile_set() const { return *binding_.tile_set; }
   [[nodiscard]] const std::vector<std::array<TileNeighbour, 4>>& neighbours() const { return neighbours_; }
+  [[nodiscard]] int num_mip_levels() const {
+    return mips_ == nullptr ? 0 : static_cast<int>(mips_->levels.size());
+  }
+  // What the taps of a level name.
+  [[nodiscard]] const BtfelTable& btfels(int level) const {
+    return level == 0 ? tile_set().btfels : mips_->levels[level - 1].btfels;
+  }
 
  private:
+  // A texel of a face's tile at some level, as seen from a face, perhaps across a side.
+  struct Texel {
+    int face = 0;
+    int x = 0;
+    int y = 0;
+    int turns = 0;  // of the face's tile, as the other sees it
+    double weight = 1.0;
+  };
+
   DressedSurface() = default;
-  [[nodiscard]] Tap TapAt(int face, int x, int y) const;
+  // One step beyond a side of the tile, w texels wide, is allowed.
+  [[nodiscard]] Texel TexelAt(int face, int x, int y, int w) const;
+  [[nodiscard]] std::array<Texel, 4> BilinearTexels(const SurfacePoint& point, int w) const;
+  [[nodiscard]] Tap TapOf(const Texel& texel) const;
+  void AppendMipTaps(const SurfacePoint& point, int level, double weight, std::vector<Tap>& taps) const;
 
   Binding binding_;
+  const TileMips* mips_ = nullptr;
   std::vector<std::array<TileNeighbour, 4>> neighbours_;  // [face][tile side]
 };
 
 // Reflectance >= 0 that the taps show in `frame` under unit world directions; a view below the horizon is
 // lifted to kLeastViewCosine.
 [[nodiscard]] Eigen::Array3d ReflectanceOfTaps(const DressedSurface& surface, const Decoder& decoder,
-                                               const SurfaceFrame& frame, const Taps& taps,
+                                               const SurfaceFrame& frame, std::span<const Tap> taps,
                                                const Eigen::Vector3d& to_light,
                                                const Eigen::Vector3d& to_eye);
 

@@ -119,6 +119,82 @@ TEST_F(PreviewTest, GlMatchesTheReferenceOnSkewedQuadsMagnifiedAndMinified) {
   }
 }
 
+TEST_F(PreviewTest, GlMatchesTheReferenceWithMipLevels) {
+  const Dressing dressing = RandomDressing(SkewedGrid(4, 0.3, 7), 8);
+  // One part a texel; four; tiles that end with 3 x 3 texels.
+  for (const auto& [basis, tile_size] :
+       {std::pair(testing::BasisKind::kOrthonormal, 64), std::pair(testing::BasisKind::kGeneral, 64),
+        std::pair(testing::BasisKind::kIdentity, 24)}) {
+    const TileSet tile_set = RandomTileSet(RandomBtfels(50, 9, 4, 2, basis), tile_size, 3);
+    const auto mips = MakeTileMips(tile_set, {}, run_);
+    ASSERT_TRUE(mips.ok()) << mips.status();
+    PreviewScene scene{.dressing = &dressing, .tile_set = &tile_set, .width = 96, .height = 72};
+    scene.mips = &*mips;
+    scene.lights = {{.kind = Light::Kind::kPoint, .place = {-0.5, 0.2, 1.0}}};
+    scene.camera.fov_y_rad = RadFromDeg(60.0);
+    // Along the surface, so that near and far texels are seen, and from afar.
+    scene.camera.eye = {0.3, -1.4, 0.5};
+    ExpectAgreement(scene);
+    scene.camera.eye = {1.5, -4.0, 5.0};
+    scene.camera.fov_y_rad = RadFromDeg(30.0);
+    ExpectAgreement(scene);
+    if (tile_size == 24) {
+      scene.filter = Filter::kNearest;
+      ExpectAgreement(scene);
+    }
+  }
+}
+
+TEST_F(PreviewTest, MipLevelsLeaveMagnifiedTexelsAsTheyAre) {
+  const Dressing dressing = RandomDressing(SkewedGrid(4, 0.3, 7), 8);
+  const TileSet tile_set = RandomTileSet(RandomBtfels(50, 9, 4, 2), 16, 3);
+  const auto mips = MakeTileMips(tile_set, {}, run_);
+  ASSERT_TRUE(mips.ok());
+  PreviewScene scene{.dressing = &dressing, .tile_set = &tile_set, .width = kWidth, .height = kHeight};
+  scene.camera.eye = {0.1, 0.05, 1.2};
+  const auto without = RenderReference(scene, run_);
+  scene.mips = &*mips;
+  const auto with = RenderReference(scene, run_);
+  ASSERT_TRUE(without.ok() && with.ok());
+  EXPECT_EQ(with->pixels, without->pixels);
+}
+
+// Noise from far away: what four samples a pixel show of it changes from pixel to pixel.
+TEST_F(PreviewTest, MipLevelsKeepFarObjectsFromAliasing) {
+  const Dressing dressing = RandomDressing(SkewedGrid(4, 0.1, 7), 8);
+  const TileSet tile_set = RandomTileSet(RandomBtfels(50, 4, 4, 2), 64, 3);
+  const auto mips = MakeTileMips(tile_set, {}, run_);
+  ASSERT_TRUE(mips.ok());
+  constexpr int kFiner = 8;
+  // Four and eight texels a pixel, and more along the slope.
+  for (const int height : {32, 16}) {
+    PreviewScene scene{.dressing = &dressing, .tile_set = &tile_set, .width = height, .height = height};
+    scene.camera.eye = {1.2, 0.0, 3.0};
+    scene.camera.fov_y_rad = 0.3;
+    PreviewScene fine = scene;
+    fine.width *= kFiner;
+    fine.height *= kFiner;
+    const auto supersampled = RenderGl(*context_, fine, run_);
+    const auto without = RenderGl(*context_, scene, run_);
+    scene.mips = &*mips;
+    const auto with = RenderGl(*context_, scene, run_);
+    ASSERT_TRUE(supersampled.ok() && without.ok() && with.ok());
+    double squares_without = 0.0;
+    double squares_with = 0.0;
+    for (int y = 0; y < scene.height; ++y) {
+      for (int x = 0; x < scene.width; ++x) {
+        double mean = 0.0;
+        for (int i = 0; i < kFiner * kFiner; ++i) {
+          mean += supersampled->at(x * kFiner + i % kFiner, y * kFiner + i / kFiner)[1] / (kFiner * kFiner);
+        }
+        squares_without += std::pow(without->at(x, y)[1] - mean, 2);
+        squares_with += std::pow(with->at(x, y)[1] - mean, 2);
+      }
+    }
+    EXPECT_LT(squares_with, 0.15 * squares_without) << height;
+  }
+}
+
 TEST_F(PreviewTest, GlMatchesTheReferenceFromInsideASolid) {
   const auto mesh = BuiltinShape("cube-sphere");
   ASSERT_TRUE(mesh.ok());
@@ -284,6 +360,11 @@ TEST_F(PreviewTest, APreparedPreviewDrawsWhatItsScenesAskFor) {
     }
   }
   EXPECT_EQ((*beside)->Render(scene, run_).status().code(), absl::StatusCode::kInvalidArgument);
+  const auto mips = MakeTileMips(tile_set, {}, run_);
+  ASSERT_TRUE(mips.ok());
+  scene.mips = &*mips;
+  EXPECT_EQ((*preview)->Render(scene, run_).status().code(), absl::StatusCode::kInvalidArgument);
+  scene.mips = nullptr;
   scene.tile_set = &other;
   EXPECT_EQ((*preview)->Render(scene, run_).status().code(), absl::StatusCode::kInvalidArgument);
   EXPECT_TRUE((*beside)->Render(scene, run_).ok());

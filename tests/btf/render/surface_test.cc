@@ -1,5 +1,8 @@
 #include "btf/render/surface.h"
 
+#include <algorithm>
+#include <cmath>
+
 #include <gtest/gtest.h>
 #include <Eigen/Geometry>
 
@@ -18,6 +21,8 @@ using testing::RandomTileSet;
 using testing::SkewedGrid;
 
 constexpr double kRounding = 1e-9;
+// Of weights in single precision.
+constexpr double kWeightRounding = 1e-6;
 
 // The point at `along` of side k, counted from the side's start.
 SurfacePoint PointOnSide(int face, int side, double along) {
@@ -118,6 +123,37 @@ TEST_F(SurfaceTest, TilesLaidTurnedShowWhatTurnedTilesShow) {
   }
 }
 
+TEST_F(SurfaceTest, BothSidesOfEveryEdgeShowTheSameMipLevels) {
+  const auto mips = MakeTileMips(tile_set_, {}, {});
+  ASSERT_TRUE(mips.ok()) << mips.status();
+  const auto surface = DressedSurface::Create(dressing_, tile_set_, &*mips);
+  ASSERT_TRUE(surface.ok()) << surface.status();
+  ASSERT_EQ(surface->num_mip_levels(), 4);
+  const auto decoder = MakeDecoder(tile_set_.btfels);
+  const auto adjacency = BuildAdjacency(dressing_.mesh);
+  ASSERT_TRUE(decoder.ok() && adjacency.ok());
+  const Eigen::Vector3d to_light = Eigen::Vector3d(0.5, -0.3, 0.8).normalized();
+  const Eigen::Vector3d to_eye = Eigen::Vector3d(0.4, 0.3, 3.0).normalized();
+  for (const double level : {0.4, 1.0, 2.5, 4.0}) {
+    for (int face = 0; face < kFaces * kFaces; ++face) {
+      for (int side = 0; side < 4; ++side) {
+        const QuadAdjacency::Across across = adjacency->across[face][side];
+        for (int i = 0; i < 5 && across.face > face; ++i) {
+          const double along = 0.03 + 0.94 * i / 4.0;
+          const auto reflectance = [&](const SurfacePoint& point) {
+            return ReflectanceOfTaps(*surface, **decoder, surface->FrameAt(point),
+                                     surface->MipTaps(point, level), to_light, to_eye);
+          };
+          const Eigen::Array3d here = reflectance(PointOnSide(face, side, along));
+          const Eigen::Array3d there = reflectance(PointOnSide(across.face, across.side, 1.0 - along));
+          EXPECT_LT((here - there).abs().maxCoeff(), 3e-4)
+              << "level " << level << " face " << face << " side " << side << " at " << along;
+        }
+      }
+    }
+  }
+}
+
 TEST_F(SurfaceTest, FramesAreOrthonormalAndEqualUpToQuarterTurnsAcrossEdges) {
   const auto surface = DressedSurface::Create(dressing_, tile_set_);
   ASSERT_TRUE(surface.ok());
@@ -188,6 +224,39 @@ TEST_F(SurfaceTest, WeightsSumToOneEverywhere) {
   }
 }
 
+TEST_F(SurfaceTest, WeightsOfMipLevelsSumToOneAndNameTheLevelsAround) {
+  // A basis that does not turn: up to four parts a texel.
+  tile_set_ = RandomTileSet(RandomBtfels(64, 4, 4, 3, testing::BasisKind::kGeneral), 16, 4);
+  const auto mips = MakeTileMips(tile_set_, {}, {});
+  ASSERT_TRUE(mips.ok()) << mips.status();
+  const auto surface = DressedSurface::Create(dressing_, tile_set_, &*mips);
+  ASSERT_TRUE(surface.ok());
+  for (const double level : {-1.0, 0.0, 0.25, 1.0, 2.75, 4.0, 99.0}) {
+    const double clamped = std::clamp(level, 0.0, 4.0);
+    double sum = 0.0;
+    double mean_level = 0.0;
+    for (const Tap& tap : surface->MipTaps({7, 0.3, 0.97}, level)) {
+      EXPECT_LE(std::abs(tap.level - clamped), 1.0);
+      sum += tap.weight;
+      mean_level += tap.weight * tap.level;
+    }
+    EXPECT_NEAR(sum, 1.0, kWeightRounding);
+    EXPECT_NEAR(mean_level, clamped, kWeightRounding);
+  }
+}
+
+TEST_F(SurfaceTest, TangentsAreTheChangesOfThePosition) {
+  const auto surface = DressedSurface::Create(dressing_, tile_set_);
+  ASSERT_TRUE(surface.ok());
+  const SurfacePoint at{7, 0.3, 0.6};
+  const Eigen::Vector3d position = surface->PositionAt(at);
+  // Bilinear: differences of any size along s or q are exact.
+  EXPECT_LT((surface->TangentsAt(at).col(0) - (surface->PositionAt({7, 0.8, 0.6}) - position) / 0.5).norm(),
+            kRounding);
+  EXPECT_LT((surface->TangentsAt(at).col(1) - (surface->PositionAt({7, 0.3, 0.1}) - position) / -0.5).norm(),
+            kRounding);
+}
+
 TEST_F(SurfaceTest, RefusesWhatDoesNotFit) {
   Dressing other = dressing_;
   other.arrangement_sha256 = "0";
@@ -201,6 +270,15 @@ TEST_F(SurfaceTest, RefusesWhatDoesNotFit) {
   TileSet tile_set = tile_set_;
   tile_set.tile_index[99] = PackTexel(64, 1);
   EXPECT_EQ(DressedSurface::Create(dressing_, tile_set).status().code(), absl::StatusCode::kInvalidArgument);
+  auto mips = MakeTileMips(RandomTileSet(RandomBtfels(9, 9, 9, 3), 8, 4), {}, {});
+  ASSERT_TRUE(mips.ok());
+  EXPECT_EQ(DressedSurface::Create(dressing_, tile_set_, &*mips).status().code(),
+            absl::StatusCode::kInvalidArgument);
+  mips = MakeTileMips(tile_set_, {}, {});
+  ASSERT_TRUE(mips.ok());
+  mips->levels[2].parts[5].texel = PackTexel(1U << 20, 0);
+  EXPECT_EQ(DressedSurface::Create(dressing_, tile_set_, &*mips).status().code(),
+            absl::StatusCode::kInvalidArgument);
 }
 
 TEST_F(SurfaceTest, DegenerateQuadsHaveFiniteFrames) {
