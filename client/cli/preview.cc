@@ -23,6 +23,7 @@ struct PreviewFlags {
   uint64_t seed = 1;
   std::vector<std::string> lights;
   std::string size = "640x480";
+  std::string mips = "auto";
   std::string output;
 };
 
@@ -57,6 +58,9 @@ absl::Status RunPreview(Session& session, const PreviewFlags& flags) {
   request.set_format(format == PictureFormat::kPng ? v1::RenderPreviewRequest::PNG
                                                    : v1::RenderPreviewRequest::EXR);
   request.set_seed(flags.seed);
+  request.set_mips(flags.mips == "on"    ? v1::RenderPreviewRequest::ON
+                   : flags.mips == "off" ? v1::RenderPreviewRequest::OFF
+                                         : v1::RenderPreviewRequest::AUTO);
 
   TESSERA_ASSIGN_OR_RETURN(Client * client, session.Connect());
   const RunContext context = session.Context();
@@ -111,6 +115,13 @@ void AddPreviewCommand(CLI::App& app, Session& session) {
       ->expected(1)
       ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
   command->add_option("--size", flags->size, "WIDTHxHEIGHT in pixels")->capture_default_str();
+  command
+      ->add_option(
+          "--mips", flags->mips,
+          "Mip levels, against noise where pixels are larger than texels: on, off, or auto, on from two "
+          "texels a pixel")
+      ->check(CLI::IsMember({"auto", "on", "off"}))
+      ->capture_default_str();
   command
       ->add_option(
           "-o,--output", flags->output,

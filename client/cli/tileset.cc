@@ -1,4 +1,4 @@
-// tessera tileset synthesize | list | show | pull | certify | sheet | delete
+// tessera tileset synthesize | list | show | pull | certify | sheet | mips | delete
 #include <memory>
 
 #include <fmt/format.h>
@@ -6,6 +6,7 @@
 #include "btf/base/atomic_file.h"
 #include "btf/base/status_macros.h"
 #include "btf/image/image_io.h"
+#include "btf/mips/tile_mips.h"
 #include "btf/render/sheet.h"
 #include "client/cli/arguments.h"
 #include "client/cli/certificate.h"
@@ -198,6 +199,48 @@ absl::Status RunTileSetSheet(Session& session, const TileSetSheetFlags& flags) {
   return absl::OkStatus();
 }
 
+absl::Status RunMips(Session& session, const std::string& name) {
+  TESSERA_ASSIGN_OR_RETURN(const std::string full_name, FullTileSetName(name));
+  TESSERA_ASSIGN_OR_RETURN(Client * client, session.Connect());
+  const RunContext context = session.Context();
+  TESSERA_ASSIGN_OR_RETURN(const TileSet tile_set, client->FetchTileSet(full_name, context));
+  TESSERA_ASSIGN_OR_RETURN(const TileMips mips, MakeTileMips(tile_set, {}, context));
+  const std::vector<StageTime> stages = session.FinishStages();
+  const auto bytes_text = [](uint64_t bytes) { return FormatAmount(static_cast<double>(bytes), "bytes"); };
+  const uint64_t own_bytes = tile_set.btfels.codes.size() + tile_set.tile_index.size() * sizeof(uint32_t);
+  std::vector<std::vector<std::string>> rows = {
+      {"LEVEL", "TILE", "TEXELS", "BTFELS", "SIZE", "RMSE"},
+      {"0", fmt::format("{0}x{0}", tile_set.tile_size), std::to_string(tile_set.tile_index.size()),
+       std::to_string(tile_set.btfels.size()), bytes_text(own_bytes), ""}};
+  Json levels = Json::array();
+  for (const MipLevel& level : mips.levels) {
+    const size_t texels = level.parts.size() / mips.parts_per_texel;
+    levels.push_back({{"level", levels.size() + 1},
+                      {"tile_size", level.tile_size},
+                      {"texels", texels},
+                      {"btfels", level.btfels.size()},
+                      {"size_bytes", level.size_bytes()},
+                      {"quantisation_rmse", level.quantisation_rmse}});
+    rows.push_back({std::to_string(levels.size()), fmt::format("{0}x{0}", level.tile_size),
+                    std::to_string(texels), std::to_string(level.btfels.size()),
+                    bytes_text(level.size_bytes()), fmt::format("{:.6f}", level.quantisation_rmse)});
+  }
+  std::string text = TextTable(rows);
+  for (const StageTime& stage : stages) {
+    if (stage.stage == "mips") {
+      text += fmt::format("\n{} parts a texel, {}, {:.2f} s", mips.parts_per_texel,
+                          bytes_text(mips.size_bytes()), stage.seconds);
+    }
+  }
+  session.Answer({{"name", ShortName(full_name)},
+                  {"parts_per_texel", mips.parts_per_texel},
+                  {"size_bytes", mips.size_bytes()},
+                  {"levels", std::move(levels)},
+                  {"stages", Session::JsonOfStages(stages)}},
+                 text);
+  return absl::OkStatus();
+}
+
 absl::Status RunDelete(Session& session, const std::string& name) {
   TESSERA_ASSIGN_OR_RETURN(const std::string full_name, FullTileSetName(name));
   TESSERA_ASSIGN_OR_RETURN(Client * client, session.Connect());
@@ -288,6 +331,12 @@ void AddTileSetCommands(CLI::App& app, Session& session) {
   });
 
   AddSheet(*noun, session);
+
+  CLI::App* mips = noun->add_subcommand("mips",
+                                        "The mip levels that pictures of far objects use: sizes, and how far "
+                                        "8 bits take them from exact means");
+  mips->add_option("TILESET", *name, "ARRANGEMENT/NAME")->required();
+  mips->callback([&session, name] { session.run = [&session, name] { return RunMips(session, *name); }; });
 
   CLI::App* remove = noun->add_subcommand("delete", "Free the name");
   remove->add_option("TILESET", *name, "ARRANGEMENT/NAME")->required();

@@ -2,12 +2,14 @@
 
 #include <algorithm>
 #include <chrono>
+#include <optional>
 #include <span>
 
 #include <absl/strings/str_cat.h>
 
 #include "btf/base/status_macros.h"
 #include "btf/image/image_io.h"
+#include "btf/mips/tile_mips.h"
 #include "btf/render/preview.h"
 #include "btf/wang/shapes.h"
 #include "btf/wang/tile_set.h"
@@ -21,6 +23,7 @@ namespace tessera {
 namespace {
 
 constexpr std::chrono::milliseconds kContextPoll{20};
+constexpr double kTexelsWithoutMips = 2.0;  // along a pixel's side
 
 absl::Status Refuse(const std::string& message, std::string_view field) {
   return WithReason(absl::InvalidArgumentError(message), "ARGUMENT_INVALID", field);
@@ -34,6 +37,28 @@ absl::StatusOr<int> SideOf(uint32_t requested, uint32_t usual, std::string_view 
         field);
   }
   return static_cast<int>(side);
+}
+
+// Nothing where none are wanted, or where they are not to be had and nobody insists. The scene is complete
+// but for them.
+absl::StatusOr<std::optional<TileMips>> MipsOf(v1::RenderPreviewRequest::Mips wanted,
+                                               const PreviewScene& scene, const RunContext& context) {
+  if (!v1::RenderPreviewRequest::Mips_IsValid(wanted)) {
+    return Refuse(absl::StrCat("mips ", static_cast<int>(wanted), ", expected AUTO, ON or OFF"), "mips");
+  }
+  const bool is_auto = wanted == v1::RenderPreviewRequest::AUTO;
+  if (wanted == v1::RenderPreviewRequest::OFF || (is_auto && TexelsPerPixel(scene) <= kTexelsWithoutMips)) {
+    return std::nullopt;
+  }
+  absl::StatusOr<TileMips> mips = MakeTileMips(*scene.tile_set, {.max_bytes = kMaxPreviewMipBytes}, context);
+  if (mips.ok()) {
+    return *std::move(mips);
+  }
+  const bool is_refused = absl::IsInvalidArgument(mips.status()) || absl::IsResourceExhausted(mips.status());
+  if (is_auto && is_refused) {
+    return std::nullopt;
+  }
+  return is_refused ? WithReason(mips.status(), "ARGUMENT_INVALID", "mips") : mips.status();
 }
 
 }  // namespace
@@ -104,6 +129,8 @@ absl::StatusOr<std::string> PreviewsService::Render(const v1::RenderPreviewReque
   scene.tile_set = &tile_set;
   scene.camera = request.has_camera() ? CameraFromMessage(request.camera())
                                       : FramingCamera(dressing.mesh, scene.width, scene.height);
+  TESSERA_ASSIGN_OR_RETURN(const std::optional<TileMips> mips, MipsOf(request.mips(), scene, context));
+  scene.mips = mips.has_value() ? &*mips : nullptr;
 
   std::unique_lock lock(context_mutex_, std::defer_lock);
   while (!lock.try_lock_for(kContextPoll)) {

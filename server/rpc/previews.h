@@ -20,6 +20,8 @@ namespace tessera {
 inline constexpr uint32_t kMinPreviewSide = 16;
 inline constexpr uint32_t kMaxPreviewSide = 4096;
 inline constexpr int kMaxPreviewLights = 64;
+// Codes and index of mip levels; on the way into the picture they take about twice as much again.
+inline constexpr uint64_t kMaxPreviewMipBytes = uint64_t{512} << 20;
 
 // Pictures are drawn one after the other in one offscreen context: the software renderer spreads each over
 // every core by itself. Thread-safe.

@@ -115,6 +115,11 @@ TEST_F(ServerTest, PicturesAreDrawn) {
   EXPECT_EQ(*render(), *png);
   request.set_format(v1::RenderPreviewRequest::EXR);
   EXPECT_EQ(render()->substr(0, 4), "\x76\x2f\x31\x01");
+  request.set_mips(v1::RenderPreviewRequest::ON);
+  EXPECT_TRUE(render().ok()) << render().status();
+  request.set_mips(static_cast<v1::RenderPreviewRequest::Mips>(7));
+  EXPECT_EQ(SubjectOf(render().status()), "mips");
+  request.clear_mips();
 
   v1::DressMeshRequest dress;
   dress.set_arrangement("arrangements/plane-16");
