@@ -469,6 +469,20 @@ TEST(FramingCamera, ShowsEveryVertexInsideTheFrame) {
   }
 }
 
+TEST(TexelsPerPixel, IsTheTexelsAlongAPixelOfAFacingPlane) {
+  // Two units wide, of 4 x 4 tiles of 16 texels.
+  const Dressing dressing = RandomDressing(SkewedGrid(4, 0.0, 1), 2);
+  const TileSet tile_set = RandomTileSet(WhiteDiffuser(), 16, 3);
+  PreviewScene scene{.dressing = &dressing, .tile_set = &tile_set, .width = kWidth, .height = kHeight};
+  for (const double distance : {1.0, 3.0, 40.0}) {
+    scene.camera.eye = {0.0, 0.0, distance};
+    const double units_per_pixel = 2.0 * distance * std::tan(0.5 * scene.camera.fov_y_rad) / kHeight;
+    EXPECT_NEAR(TexelsPerPixel(scene) / (32.0 * units_per_pixel), 1.0, 1e-5);
+    scene.camera.eye.z() = -distance;
+    EXPECT_EQ(TexelsPerPixel(scene), 0.0);
+  }
+}
+
 TEST(CompositeOver, BlendsByCoverage) {
   Image picture(2, 1, 4);
   const std::vector<float> pixels = {1.0f, 0.5f, 0.0f, 0.25f, 9.0f, 9.0f, 9.0f, 0.0f};
