@@ -68,13 +68,21 @@ int RegionSide(const Exemplar& exemplar, int feature_size) {
 }
 
 ExemplarSpectra::ExemplarSpectra(const Exemplar& exemplar, const std::vector<int>& turns, int region_side,
-                                 const RunContext& context)
+                                 const RunContext& context, const std::vector<uint8_t>& excluded)
     : exemplar_(&exemplar),
+      excluded_(excluded),
+      excluded_sums_(exemplar.width(), exemplar.height()),
       region_width_(std::min(exemplar.width(), region_side)),
       region_height_(std::min(exemplar.height(), region_side)),
       channels_(exemplar.search_dims() + 1),
       transform_(std::make_unique<FourierTransform>(std::max(region_width_, region_height_))),
       spectra_(4) {
+  for (uint32_t pixel = 0; pixel < excluded_.size(); ++pixel) {
+    if (excluded_[pixel] != 0) {
+      excluded_sums_.Count({&pixel, 1});
+    }
+  }
+  excluded_sums_.Finish();
   for (const int y : RegionStarts(exemplar.height(), region_height_)) {
     for (const int x : RegionStarts(exemplar.width(), region_width_)) {
       regions_.push_back({x, y});
@@ -114,6 +122,21 @@ std::array<int, 2> ExemplarSpectra::TurnedRegionOrigin(int turn, int region) con
   const int below = exemplar_->height() - y - region_height_;
   const std::array<std::array<int, 2>, 4> of_turn = {{{x, y}, {y, right}, {right, below}, {below, x}}};
   return of_turn[turn];
+}
+
+Patch ExemplarSpectra::NextAllowed(const Patch& patch, int width, int height, int margin_u,
+                                   int margin_v) const {
+  const int num_u = exemplar_->TurnedWidth(patch.turn) - width - 2 * margin_u + 1;
+  const int num_v = exemplar_->TurnedHeight(patch.turn) - height - 2 * margin_v + 1;
+  const int first = (patch.v - margin_v) * num_u + patch.u - margin_u;
+  for (int step = 0; step < num_u * num_v; ++step) {
+    const int place = (first + step) % (num_u * num_v);
+    const Patch next{patch.turn, margin_u + place % num_u, margin_v + place / num_u};
+    if (MayBring(next, width, height)) {
+      return next;
+    }
+  }
+  return patch;
 }
 
 UsageMap::UsageMap(int width, int height)
@@ -221,8 +244,12 @@ std::vector<Candidate> CandidateSearch::Search(const SearchQuery& query, int reg
     const auto [first_u, first_v] = spectra_->TurnedRegionOrigin(turn, region);
     for (int v = 0; v < num_v; ++v) {
       for (int u = 0; u < num_u; ++u) {
+        const Patch patch{turn, first_u + u, first_v + v};
+        if (!spectra_->MayBring(patch, query.width, query.height)) {
+          continue;
+        }
         const double squares = std::max(0.0, wanted_square + double{correlation_(u, v)});
-        offsets_.push_back({Patch{turn, first_u + u, first_v + v}, squares / norm});
+        offsets_.push_back({patch, squares / norm});
       }
     }
   }

@@ -22,49 +22,6 @@
 
 namespace tessera {
 
-class FourierTransform;
-
-// Side of the regions for windows of up to three features, in texels.
-[[nodiscard]] int RegionSide(const Exemplar& exemplar, int feature_size);
-
-// Transforms of the exemplar in its turns, by regions, and the plans; shared by all threads.
-class ExemplarSpectra {
- public:
-  // Regions are at most `region_side` wide and high, of one size, and overlap by a quarter or more.
-  ExemplarSpectra(const Exemplar& exemplar, const std::vector<int>& turns, int region_side,
-                  const RunContext& context);
-  ~ExemplarSpectra();
-  ExemplarSpectra(const ExemplarSpectra&) = delete;
-  ExemplarSpectra& operator=(const ExemplarSpectra&) = delete;
-
-  [[nodiscard]] const Exemplar& exemplar() const { return *exemplar_; }
-  [[nodiscard]] int num_regions() const { return static_cast<int>(regions_.size()); }
-  // The shorter side of a region.
-  [[nodiscard]] int shorter_side() const { return std::min(region_width_, region_height_); }
-  // A region, drawn uniformly; where there is one only, nothing is drawn.
-  [[nodiscard]] int DrawRegion(Rng& rng) const;
-
- private:
-  friend class CandidateSearch;
-
-  [[nodiscard]] int TurnedRegionWidth(int turn) const {
-    return (turn & 1) == 0 ? region_width_ : region_height_;
-  }
-  [[nodiscard]] int TurnedRegionHeight(int turn) const {
-    return (turn & 1) == 0 ? region_height_ : region_width_;
-  }
-  // The region's first column and row in the turned exemplar.
-  [[nodiscard]] std::array<int, 2> TurnedRegionOrigin(int turn, int region) const;
-
-  const Exemplar* exemplar_;
-  int region_width_ = 0;
-  int region_height_ = 0;
-  std::vector<std::array<int, 2>> regions_;  // first column and row, unturned
-  int channels_ = 0;                         // search dimensions and the squared length
-  std::unique_ptr<FourierTransform> transform_;
-  std::vector<std::vector<Eigen::MatrixXf>> spectra_;  // [turn][region], empty for a turn not asked for
-};
-
 // How often each exemplar pixel has been used, whatever the turn. Sums over rectangles in constant time.
 class UsageMap {
  public:
@@ -82,6 +39,64 @@ class UsageMap {
   int height_;
   std::vector<uint32_t> counts_;
   std::vector<uint64_t> sums_;  // [height + 1][width + 1]
+};
+
+class FourierTransform;
+
+// Side of the regions for windows of up to three features, in texels.
+[[nodiscard]] int RegionSide(const Exemplar& exemplar, int feature_size);
+
+// Transforms of the exemplar in its turns, by regions; shared by all threads.
+class ExemplarSpectra {
+ public:
+  // Regions are at most `region_side` wide and high, of one size, and overlap by a quarter or more.
+  // `excluded`, by pixel, is empty or 1 where no patch may lie.
+  ExemplarSpectra(const Exemplar& exemplar, const std::vector<int>& turns, int region_side,
+                  const RunContext& context, const std::vector<uint8_t>& excluded = {});
+  ~ExemplarSpectra();
+  ExemplarSpectra(const ExemplarSpectra&) = delete;
+  ExemplarSpectra& operator=(const ExemplarSpectra&) = delete;
+
+  [[nodiscard]] const Exemplar& exemplar() const { return *exemplar_; }
+  [[nodiscard]] int num_regions() const { return static_cast<int>(regions_.size()); }
+  // The shorter side of a region.
+  [[nodiscard]] int shorter_side() const { return std::min(region_width_, region_height_); }
+  // A region, drawn uniformly; where there is one only, nothing is drawn.
+  [[nodiscard]] int DrawRegion(Rng& rng) const;
+
+  [[nodiscard]] bool excludes(uint32_t texel) const {
+    return !excluded_.empty() && excluded_[BtfelOfTexel(texel)] != 0;
+  }
+  // Whether a patch of this size is free of excluded texels; it must lie inside the turned exemplar.
+  [[nodiscard]] bool MayBring(const Patch& patch, int width, int height) const {
+    return excluded_.empty() || excluded_sums_.RelativeUse(patch, width, height) == 0.0;
+  }
+  // The first such place in reading order at or after `patch`, going round, that leaves `margin` texels to
+  // the rim of the turned exemplar; `patch` itself where there is none.
+  [[nodiscard]] Patch NextAllowed(const Patch& patch, int width, int height, int margin_u,
+                                  int margin_v) const;
+
+ private:
+  friend class CandidateSearch;
+
+  [[nodiscard]] int TurnedRegionWidth(int turn) const {
+    return (turn & 1) == 0 ? region_width_ : region_height_;
+  }
+  [[nodiscard]] int TurnedRegionHeight(int turn) const {
+    return (turn & 1) == 0 ? region_height_ : region_width_;
+  }
+  // The region's first column and row in the turned exemplar.
+  [[nodiscard]] std::array<int, 2> TurnedRegionOrigin(int turn, int region) const;
+
+  const Exemplar* exemplar_;
+  std::vector<uint8_t> excluded_;
+  UsageMap excluded_sums_;
+  int region_width_ = 0;
+  int region_height_ = 0;
+  std::vector<std::array<int, 2>> regions_;  // first column and row, unturned
+  int channels_ = 0;                         // search dimensions and the squared length
+  std::unique_ptr<FourierTransform> transform_;
+  std::vector<std::vector<Eigen::MatrixXf>> spectra_;  // [turn][region], empty for a turn not asked for
 };
 
 // What a window wants: points and weights by texel.

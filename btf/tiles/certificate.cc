@@ -4,6 +4,7 @@
 #include <cmath>
 #include <map>
 #include <memory>
+#include <optional>
 
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_format.h>
@@ -15,6 +16,7 @@
 #include "btf/codec/codec.h"
 #include "btf/codec/decoder.h"
 #include "btf/math/conventions.h"
+#include "btf/tiles/features.h"
 #include "btf/tiles/repetition.h"
 #include "btf/tiles/seam_controls.h"
 #include "btf/tiles/tile_sides.h"
@@ -418,8 +420,11 @@ absl::StatusOr<Certificate> CertifyTiles(const Material& material, const Exempla
   return certificate;
 }
 
-absl::Status CertifyTileSet(const Material& material, CertificateImages which, const RunContext& context,
+absl::Status CertifyTileSet(const Material& original, CertificateImages which, const RunContext& context,
                             TileSet& tile_set) {
+  TESSERA_ASSIGN_OR_RETURN(const std::optional<Material> recoloured,
+                           RecolouredAs(tile_set.metadata, original, context));
+  const Material& material = recoloured ? *recoloured : original;
   const BtfelTable& own = tile_set.btfels;
   const BtfelTable& exemplar_table = material.btfels;
   if (tile_set.source_pixels.empty()) {

@@ -138,8 +138,9 @@ inline constexpr int kHeatOfOne = 64;
                                                        int strip_height, CertificateImages which,
                                                        const RunContext& context);
 
-// Certifies a tile set again; sets its certificate and heat. Errors: FAILED_PRECONDITION when the set does
-// not know where its BTFels lie in the exemplar, or `material` is not the one it was made of (naming the
+// Certifies a tile set again; sets its certificate and heat. Colours that the set's recipe moved are moved on
+// a copy of `material`, the one that was given to SynthesizeTileSet. Errors: FAILED_PRECONDITION when the set
+// does not know where its BTFels lie in the exemplar, or `material` is not the one it was made of (naming the
 // first BTFel that differs); those of CertifyTiles, of Codec::Embed and of FindArrangement.
 [[nodiscard]] absl::Status CertifyTileSet(const Material& material, CertificateImages which,
                                           const RunContext& context, TileSet& tile_set);

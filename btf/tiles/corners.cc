@@ -138,7 +138,7 @@ int Margin(int exemplar_side, int sample_side, int strip_height) {
 class CornerSearch {
  public:
   CornerSearch(const ExemplarSpectra& spectra, const Arrangement& arrangement, int strip_height,
-               uint64_t seed)
+               uint64_t seed, const std::vector<std::optional<Patch>>& by_hand)
       : spectra_(spectra),
         exemplar_(spectra.exemplar()),
         strip_height_(strip_height),
@@ -151,6 +151,11 @@ class CornerSearch {
         samples_.push_back(RandomPlace(turns_.back()));
       }
     }
+    is_by_hand_.resize(samples_.size(), false);
+    for (size_t sample = 0; sample < by_hand.size(); ++sample) {
+      is_by_hand_[sample] = by_hand[sample].has_value();
+      samples_[sample] = by_hand[sample].value_or(samples_[sample]);
+    }
     for (int draw = 0; draw < kTypicalDraws; ++draw) {
       const Statistics statistics = Measure(RandomPlace(turns_[draw % turns_.size()]));
       typical_.mean_distance += statistics.mean_distance / kTypicalDraws;
@@ -159,6 +164,9 @@ class CornerSearch {
   }
 
   void Improve(int sample, bool greedy, const std::stop_token& stop) {
+    if (is_by_hand_[sample]) {
+      return;
+    }
     MakeQuery(sample);
     const std::vector<Candidate> candidates = search_.Search(
         query_, spectra_.DrawRegion(rng_), turns_[sample], nullptr, 0.0, kCornerCandidates, 1, stop);
@@ -312,7 +320,9 @@ class CornerSearch {
     };
     const int u = place(exemplar_.TurnedWidth(turn), strip_height_ / 2);
     const int v = place(exemplar_.TurnedHeight(turn), strip_height_);
-    return {turn, u, v};
+    return spectra_.NextAllowed({turn, u, v}, strip_height_ / 2, strip_height_,
+                                Margin(exemplar_.TurnedWidth(turn), strip_height_ / 2, strip_height_),
+                                Margin(exemplar_.TurnedHeight(turn), strip_height_, strip_height_));
   }
 
   [[nodiscard]] bool KeepsMargin(const Patch& patch) const {
@@ -347,6 +357,7 @@ class CornerSearch {
   Rng rng_;
   std::vector<std::vector<int>> turns_;  // [sample]
   std::vector<Patch> samples_;
+  std::vector<bool> is_by_hand_;  // [sample]
   Statistics typical_;
   SearchQuery query_;
   BorderCut grid_;
@@ -360,11 +371,13 @@ const CornerCut& Corners::cut(const CornerPair& pair) const {
 }
 
 absl::StatusOr<Corners> ChooseCorners(const ExemplarSpectra& spectra, const Arrangement& arrangement,
-                                      int strip_height, uint64_t seed, const RunContext& context) {
+                                      int strip_height, uint64_t seed, const RunContext& context,
+                                      const std::vector<std::optional<Patch>>& by_hand) {
   std::vector<Corners> results(kStarts);
   std::vector<double> costs(kStarts, std::numeric_limits<double>::infinity());
   ParallelFor(context, 0, kStarts, 1, [&](int64_t start, int64_t) {
-    CornerSearch search(spectra, arrangement, strip_height, Mix64(seed, static_cast<uint64_t>(start)));
+    CornerSearch search(spectra, arrangement, strip_height, Mix64(seed, static_cast<uint64_t>(start)),
+                        by_hand);
     for (int sweep = 0; sweep < kSweeps; ++sweep) {
       for (int sample = 0; sample < search.num_samples(); ++sample) {
         if (context.stop.stop_requested()) {

@@ -13,6 +13,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include <absl/status/statusor.h>
@@ -46,8 +47,9 @@ struct Corners {
 // Several random starts, each improved sample by sample: the best places for one sample against the mean of
 // all it meets come from a search, the choice among them from the true cuts, drawn at first and greedy at the
 // end. Samples less than a strip height apart in the exemplar pay dearly for it, so that not one patch serves
-// every corner. Errors: CANCELLED.
+// every corner. Samples given by hand stay where they are. Errors: CANCELLED.
 absl::StatusOr<Corners> ChooseCorners(const ExemplarSpectra& spectra, const Arrangement& arrangement,
-                                      int strip_height, uint64_t seed, const RunContext& context);
+                                      int strip_height, uint64_t seed, const RunContext& context,
+                                      const std::vector<std::optional<Patch>>& by_hand = {});
 
 }  // namespace tessera

@@ -6,9 +6,9 @@
 
 namespace tessera {
 
-absl::Status SynthesizeStrip(const ExemplarSpectra& spectra, const Corners& corners, int strip_index,
-                             int tile_size, const FillParams& params, const RunContext& context,
-                             Strip& strip) {
+absl::Status SynthesizeStrip(const ExemplarSpectra& spectra, const Corners& corners,
+                             const std::vector<PlacedFeature>& placed, int strip_index, int tile_size,
+                             const FillParams& params, const RunContext& context, Strip& strip) {
   const Exemplar& exemplar = spectra.exemplar();
   const int height = corners.strip_height;
   const int half = height / 2;
@@ -26,14 +26,29 @@ absl::Status SynthesizeStrip(const ExemplarSpectra& spectra, const Corners& corn
   place(start, 0);
   place(end, tile_size - half);
 
+  for (const PlacedFeature& feature : placed) {
+    for (const PlacedTexel& at : feature) {
+      canvas.Place(at.x, at.y, at.texel);
+    }
+  }
+
   Filler filler(spectra);
-  const int right_of_start =
-      std::min(tile_size - height, exemplar.TurnedWidth(start.turn) - (start.u + half));
+  for (const PlacedFeature& feature : placed) {
+    filler.LayAround(feature, half, canvas, strip.report);
+  }
+  int right_of_start = std::min(tile_size - height, exemplar.TurnedWidth(start.turn) - (start.u + half));
+  while (right_of_start > 0 &&
+         !spectra.MayBring({start.turn, start.u + half, start.v}, right_of_start, height)) {
+    --right_of_start;
+  }
   if (right_of_start > 0) {
     filler.Lay({half, 0, right_of_start, height}, {start.turn, start.u + half, start.v}, canvas,
                strip.report);
   }
-  const int left_of_end = std::min(tile_size - height, end.u);
+  int left_of_end = std::min(tile_size - height, end.u);
+  while (left_of_end > 0 && !spectra.MayBring({end.turn, end.u - left_of_end, end.v}, left_of_end, height)) {
+    --left_of_end;
+  }
   if (left_of_end > 0) {
     filler.Lay({tile_size - half - left_of_end, 0, left_of_end, height},
                {end.turn, end.u - left_of_end, end.v}, canvas, strip.report);

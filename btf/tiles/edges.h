@@ -7,6 +7,7 @@
 
 #include <absl/status/status.h>
 
+#include "btf/tiles/controls.h"
 #include "btf/tiles/corners.h"
 #include "btf/tiles/filler.h"
 
@@ -22,10 +23,11 @@ struct Strip {
 };
 
 // The samples first bring along what surrounds them in the exemplar, so that the first seam is free to run
-// where it is cheapest; then the filler fills what is left and improves. params.turns are those of the strip.
-// Errors: CANCELLED. Whether the thresholds were reached is in strip.report.
-absl::Status SynthesizeStrip(const ExemplarSpectra& spectra, const Corners& corners, int strip_index,
-                             int tile_size, const FillParams& params, const RunContext& context,
-                             Strip& strip);
+// where it is cheapest; so do placed features, whose texels stay; then the filler fills what is left and
+// improves. params.turns are those of the strip. Errors: CANCELLED. Whether the thresholds were reached is in
+// strip.report.
+absl::Status SynthesizeStrip(const ExemplarSpectra& spectra, const Corners& corners,
+                             const std::vector<PlacedFeature>& placed, int strip_index, int tile_size,
+                             const FillParams& params, const RunContext& context, Strip& strip);
 
 }  // namespace tessera

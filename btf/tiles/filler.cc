@@ -118,7 +118,7 @@ void MakeQuery(const Canvas& canvas, const Window& window, SearchQuery& query) {
   for (int y = 0; y < window.height; ++y) {
     for (int x = 0; x < window.width; ++x) {
       const uint32_t texel = canvas.texel(window.x + x, window.y + y);
-      if (texel == kNoTexel) {
+      if (texel == kNoTexel || canvas.placed(window.x + x, window.y + y)) {
         continue;
       }
       const size_t index = static_cast<size_t>(y) * window.width + x;
@@ -138,9 +138,14 @@ int MatchWindow(const ExemplarSpectra& spectra, const FillParams& params, const 
                 Canvas& canvas, FillReport& report) {
   MakeQuery(canvas, window, scratch.query);
   const int separation = std::max(1, matching.separation * params.feature_size / 8);
-  std::vector<Candidate> candidates =
-      scratch.search.Search(scratch.query, spectra.DrawRegion(rng), params.turns, params.usage,
-                            matching.repetition, kKeptPerCut * params.num_candidates, separation, stop);
+  const int first_region = spectra.DrawRegion(rng);
+  std::vector<Candidate> candidates;
+  // Where texels are excluded, a region may have nothing to give.
+  for (int i = 0; i < spectra.num_regions() && candidates.empty() && !stop.stop_requested(); ++i) {
+    candidates = scratch.search.Search(scratch.query, (first_region + i) % spectra.num_regions(),
+                                       params.turns, params.usage, matching.repetition,
+                                       kKeptPerCut * params.num_candidates, separation, stop);
+  }
   const int trials = (matching.trials * params.num_candidates + 7) / 8;
   candidates = SampleCandidates(std::move(candidates), trials, matching.temperature, rng);
   std::optional<Patch> best_patch;
@@ -174,6 +179,10 @@ int MatchWindow(const ExemplarSpectra& spectra, const FillParams& params, const 
 
 }  // namespace
 
+int FirstWindowSide(const ExemplarSpectra& spectra, int feature_size) {
+  return std::min(LargestWindow(spectra, feature_size), kFirstFeatures * feature_size / 2);
+}
+
 FillReport MeasureCanvas(const Canvas& canvas, const FillParams& params) {
   FillReport report;
   const Canvas::Totals totals = canvas.Measure();
@@ -196,12 +205,50 @@ void Filler::Lay(const Window& window, const Patch& patch, Canvas& canvas, FillR
   PatchCutter::Apply(window, patch, cut, canvas);
 }
 
+void Filler::LayAround(const PlacedFeature& feature, int margin, Canvas& canvas, FillReport& report) {
+  const Exemplar& exemplar = canvas.exemplar();
+  const PlacedTexel& first = feature.front();
+  const int turn = TurnsOfTexel(first.texel);
+  // Columns and rows of the turned exemplar, less those of the canvas.
+  const auto [u, v] = exemplar.TurnedPosition(first.texel);
+  const int from_x = u - first.x;
+  const int from_y = v - first.y;
+  int left = first.x;
+  int top = first.y;
+  int right = first.x;
+  int bottom = first.y;
+  for (const PlacedTexel& at : feature) {
+    left = std::min(left, at.x);
+    top = std::min(top, at.y);
+    right = std::max(right, at.x);
+    bottom = std::max(bottom, at.y);
+  }
+  for (int depth = margin; depth >= 0; --depth) {
+    Window window{std::max({left - depth, 0, -from_x}), std::max({top - depth, 0, -from_y}), 0, 0};
+    window.width =
+        std::min({right + depth + 1, canvas.width(), exemplar.TurnedWidth(turn) - from_x}) - window.x;
+    window.height =
+        std::min({bottom + depth + 1, canvas.height(), exemplar.TurnedHeight(turn) - from_y}) - window.y;
+    const Patch patch{turn, window.x + from_x, window.y + from_y};
+    bool is_allowed = true;
+    for (int y = 0; y < window.height && is_allowed; ++y) {
+      for (int x = 0; x < window.width && is_allowed; ++x) {
+        is_allowed = canvas.placed(window.x + x, window.y + y) ||
+                     !spectra_->excludes(exemplar.TexelAt(turn, patch.u + x, patch.v + y));
+      }
+    }
+    if (is_allowed) {
+      Lay(window, patch, canvas, report);
+      return;
+    }
+  }
+}
+
 absl::Status Filler::LayEmpty(const FillParams& params, const RunContext& context, Canvas& canvas,
                               FillReport& report) {
   Rng rng(Mix64(params.seed, kLaySeed));
-  const int largest = LargestWindow(*spectra_, params.feature_size);
+  const int first = FirstWindowSide(*spectra_, params.feature_size);
   while (canvas.num_unfilled() > 0) {
-    const int first = std::min(largest, kFirstFeatures * params.feature_size / 2);
     const Window window = FirstWindow(canvas, first, params.feature_size);
     const int changed =
         MatchWindow(*spectra_, params, window, kFirst, context.stop, rng, scratch_, canvas, report);

@@ -14,6 +14,7 @@
 
 #include "btf/base/run_context.h"
 #include "btf/tiles/candidates.h"
+#include "btf/tiles/controls.h"
 #include "btf/tiles/seam_graph.h"
 #include "btf/tiles/siblings.h"
 
@@ -39,6 +40,9 @@ struct FillReport {
   int num_kept = 0;
 };
 
+// Texels on a side of the windows laid first, unless the canvas is smaller.
+int FirstWindowSide(const ExemplarSpectra& spectra, int feature_size);
+
 // Mismatches of the canvas as it is; reached is false while a texel is unfilled.
 FillReport MeasureCanvas(const Canvas& canvas, const FillParams& params);
 
@@ -56,6 +60,9 @@ class Filler {
 
   // Lays one patch given by the caller: its free texels in `window` are filled or improved.
   void Lay(const Window& window, const Patch& patch, Canvas& canvas, FillReport& report);
+  // Lays what surrounds a placed feature in the exemplar, up to `margin` texels deep and as far as that
+  // brings nothing excluded, so that the first seam is free to run where it is cheapest.
+  void LayAround(const PlacedFeature& feature, int margin, Canvas& canvas, FillReport& report);
 
   // Lays first windows until nothing is unfilled. This and the two below depend on nothing but their
   // arguments and return CANCELLED within one patch search after a stop request.

@@ -36,6 +36,18 @@ absl::Status CheckReached(const FillReport& report, const SynthesisParams& param
                     "THRESHOLD_NOT_REACHED");
 }
 
+// A first window of every turn that may be asked for fits somewhere: it is square, so one turn stands for
+// all.
+absl::Status CheckExcluded(const ExemplarSpectra& spectra, const SynthesisParams& params) {
+  const int side = FirstWindowSide(spectra, params.strip_height);
+  if (spectra.MayBring(spectra.NextAllowed({0, 0, 0}, side, side, 0, 0), side, side)) {
+    return absl::OkStatus();
+  }
+  return absl::InvalidArgumentError(absl::StrFormat(
+      "features that are only placed leave no %dx%d texels of the %dx%d exemplar for synthesis", side, side,
+      spectra.exemplar().width(), spectra.exemplar().height()));
+}
+
 }  // namespace
 
 absl::Status CheckSizes(int exemplar_width, int exemplar_height, const SynthesisParams& params) {
@@ -70,7 +82,8 @@ absl::Status CheckSizes(int exemplar_width, int exemplar_height, const Synthesis
 }
 
 absl::StatusOr<IndexMaps> SynthesizeIndexMaps(const Exemplar& exemplar, const Arrangement& arrangement,
-                                              const SynthesisParams& params, const RunContext& context) {
+                                              const SynthesisParams& params, const RunContext& context,
+                                              const Controls& controls) {
   TESSERA_RETURN_IF_ERROR(CheckSizes(exemplar.width(), exemplar.height(), params));
   if (params.method != SynthesisMethod::kFrame) {
     return SynthesizeDiamonds(exemplar, arrangement, params, context);
@@ -88,12 +101,15 @@ absl::StatusOr<IndexMaps> SynthesizeIndexMaps(const Exemplar& exemplar, const Ar
       }
     }
   }
-  const ExemplarSpectra spectra(exemplar, turns, RegionSide(exemplar, params.strip_height), context);
+  const ExemplarSpectra spectra(exemplar, turns, RegionSide(exemplar, params.strip_height), context,
+                                controls.excluded);
   TESSERA_RETURN_IF_ERROR(context.CheckStop());
+  TESSERA_RETURN_IF_ERROR(CheckExcluded(spectra, params));
 
   context.Report("corners", 0, 1, "sets");
-  TESSERA_ASSIGN_OR_RETURN(const Corners corners, ChooseCorners(spectra, arrangement, params.strip_height,
-                                                                Mix64(params.seed, kCornerSeed), context));
+  TESSERA_ASSIGN_OR_RETURN(const Corners corners,
+                           ChooseCorners(spectra, arrangement, params.strip_height,
+                                         Mix64(params.seed, kCornerSeed), context, controls.corners));
   context.Report("corners", 1, 1, "sets");
 
   IndexMaps maps{.tile_size = size,
@@ -126,7 +142,8 @@ absl::StatusOr<IndexMaps> SynthesizeIndexMaps(const Exemplar& exemplar, const Ar
     const int strip = static_cast<int>(begin);
     FillParams fill = fill_params(kStripSeed, strip);
     fill.turns = TurnsOfStrip(arrangement, strip);
-    statuses[strip] = SynthesizeStrip(spectra, corners, strip, size, fill, context, maps.strips[strip]);
+    statuses[strip] = SynthesizeStrip(spectra, corners, controls.on_strip(strip), strip, size, fill, context,
+                                      maps.strips[strip]);
     count_one("strips", num_strips);
   });
   TESSERA_RETURN_IF_ERROR(context.CheckStop());
@@ -159,8 +176,8 @@ absl::StatusOr<IndexMaps> SynthesizeIndexMaps(const Exemplar& exemplar, const Ar
         BuildFrame(arrangement, arrangement.SidesOf(tile), corners, maps.strips);
     std::copy(frame.begin(), frame.end(), texels.begin());
     const Siblings siblings(maps.texels, size, margin, tile, turns_of_tiles);
-    TESSERA_RETURN_IF_ERROR(LayInterior(exemplar, size, tile_params(tile, siblings), context, filler, texels,
-                                        maps.tile_reports[tile]));
+    TESSERA_RETURN_IF_ERROR(LayInterior(exemplar, size, controls.on_tile(tile), tile_params(tile, siblings),
+                                        context, filler, texels, maps.tile_reports[tile]));
     // Insides only: how often a strip is shown is the arrangement's affair.
     for (int y = margin; y < size - margin; ++y) {
       usage.Count(texels.subspan(static_cast<size_t>(y) * size + margin, size - 2 * margin));
@@ -174,8 +191,8 @@ absl::StatusOr<IndexMaps> SynthesizeIndexMaps(const Exemplar& exemplar, const Ar
     const int tile = static_cast<int>(begin);
     const Siblings siblings(laid, size, margin, tile, turns_of_tiles);
     Filler filler(spectra);
-    statuses[tile] = ImproveInterior(exemplar, size, tile_params(tile, siblings), context, filler,
-                                     texels_of(tile), maps.tile_reports[tile]);
+    statuses[tile] = ImproveInterior(exemplar, size, controls.on_tile(tile), tile_params(tile, siblings),
+                                     context, filler, texels_of(tile), maps.tile_reports[tile]);
     count_one("tiles", num_tiles);
   });
   TESSERA_RETURN_IF_ERROR(context.CheckStop());

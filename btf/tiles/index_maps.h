@@ -7,6 +7,7 @@
 
 #include <absl/status/statusor.h>
 
+#include "btf/tiles/controls.h"
 #include "btf/tiles/edges.h"
 #include "btf/tiles/synthesize.h"
 
@@ -35,9 +36,12 @@ struct IndexMaps {
 
 // Errors: INVALID_ARGUMENT (sizes; reason MATERIAL_TOO_SMALL when the exemplar is the cause),
 // FAILED_PRECONDITION with reason THRESHOLD_NOT_REACHED naming the worst strip or tile and its figures,
-// CANCELLED. Anisotropy is not looked at.
+// CANCELLED. Anisotropy and params.recipe are not looked at: `controls` are what the recipe says, for this
+// exemplar, arrangement and sizes; diamonds take none. Where they exclude so much that no patch is left:
+// INVALID_ARGUMENT.
 absl::StatusOr<IndexMaps> SynthesizeIndexMaps(const Exemplar& exemplar, const Arrangement& arrangement,
-                                              const SynthesisParams& params, const RunContext& context);
+                                              const SynthesisParams& params, const RunContext& context,
+                                              const Controls& controls = {});
 
 // The tiles as BTFels of `material`, whose embedding they were made in: all of a tile set but its metadata
 // and certificate.

@@ -8,8 +8,9 @@ namespace tessera {
 
 namespace {
 
-// The texels on a canvas whose border row stays.
-Canvas CanvasOfTile(const Exemplar& exemplar, int size, std::span<const uint32_t> texels) {
+// The texels on a canvas whose border row and placed features stay.
+Canvas CanvasOfTile(const Exemplar& exemplar, int size, const std::vector<PlacedFeature>& placed,
+                    std::span<const uint32_t> texels) {
   Canvas canvas(exemplar, size, size);
   for (int y = 0; y < size; ++y) {
     for (int x = 0; x < size; ++x) {
@@ -21,24 +22,32 @@ Canvas CanvasOfTile(const Exemplar& exemplar, int size, std::span<const uint32_t
       }
     }
   }
+  for (const PlacedFeature& feature : placed) {
+    for (const PlacedTexel& at : feature) {
+      canvas.Place(at.x, at.y, at.texel);
+    }
+  }
   return canvas;
 }
 
 }  // namespace
 
-absl::Status LayInterior(const Exemplar& exemplar, int size, const FillParams& params,
-                         const RunContext& context, Filler& filler, std::span<uint32_t> texels,
-                         FillReport& report) {
-  Canvas canvas = CanvasOfTile(exemplar, size, texels);
+absl::Status LayInterior(const Exemplar& exemplar, int size, const std::vector<PlacedFeature>& placed,
+                         const FillParams& params, const RunContext& context, Filler& filler,
+                         std::span<uint32_t> texels, FillReport& report) {
+  Canvas canvas = CanvasOfTile(exemplar, size, placed, texels);
+  for (const PlacedFeature& feature : placed) {
+    filler.LayAround(feature, params.feature_size / 2, canvas, report);
+  }
   TESSERA_RETURN_IF_ERROR(filler.LayEmpty(params, context, canvas, report));
   std::copy(canvas.texels().begin(), canvas.texels().end(), texels.begin());
   return absl::OkStatus();
 }
 
-absl::Status ImproveInterior(const Exemplar& exemplar, int size, const FillParams& params,
-                             const RunContext& context, Filler& filler, std::span<uint32_t> texels,
-                             FillReport& report) {
-  Canvas canvas = CanvasOfTile(exemplar, size, texels);
+absl::Status ImproveInterior(const Exemplar& exemplar, int size, const std::vector<PlacedFeature>& placed,
+                             const FillParams& params, const RunContext& context, Filler& filler,
+                             std::span<uint32_t> texels, FillReport& report) {
+  Canvas canvas = CanvasOfTile(exemplar, size, placed, texels);
   TESSERA_RETURN_IF_ERROR(filler.Improve(params, context, canvas, report));
   std::copy(canvas.texels().begin(), canvas.texels().end(), texels.begin());
   return absl::OkStatus();

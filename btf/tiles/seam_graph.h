@@ -49,12 +49,18 @@ class Canvas {
   [[nodiscard]] uint32_t texel(int x, int y) const { return texels_[Index(x, y)]; }
   [[nodiscard]] bool filled(int x, int y) const { return texel(x, y) != kNoTexel; }
   [[nodiscard]] bool fixed(int x, int y) const { return fixed_[Index(x, y)] != 0; }
+  [[nodiscard]] bool placed(int x, int y) const { return fixed_[Index(x, y)] == 2; }
   [[nodiscard]] const std::vector<uint32_t>& texels() const { return texels_; }
   [[nodiscard]] int num_unfilled() const { return num_unfilled_; }
 
   void Set(int x, int y, uint32_t texel);
   // A fixed texel is never replaced by a patch.
   void Fix(int x, int y) { fixed_[Index(x, y)] = 1; }
+  // Sets and fixes a texel of a placed feature: what surrounds it need not look like it.
+  void Place(int x, int y, uint32_t texel) {
+    Set(x, y, texel);
+    fixed_[Index(x, y)] = 2;
+  }
 
   // Cost of the pair (x, y), (x + 1, y), and of (x, y), (x, y + 1); 0 while either is unfilled.
   [[nodiscard]] int right_cost(int x, int y) const { return right_[Index(x, y)]; }
@@ -78,7 +84,7 @@ class Canvas {
   int height_;
   int num_unfilled_;
   std::vector<uint32_t> texels_;
-  std::vector<uint8_t> fixed_;
+  std::vector<uint8_t> fixed_;  // 0 free, 1 fixed, 2 placed
   std::vector<int> right_, down_;
 };
 

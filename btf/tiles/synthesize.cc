@@ -14,6 +14,7 @@
 #include "btf/codec/codec.h"
 #include "btf/tiles/anisotropy.h"
 #include "btf/tiles/certificate.h"
+#include "btf/tiles/features.h"
 #include "btf/tiles/index_maps.h"
 #include "btf/tiles/pattern.h"
 
@@ -213,23 +214,23 @@ TileSet TileSetOfMaps(const Material& material, const Arrangement& arrangement, 
   return set;
 }
 
-absl::StatusOr<TileSet> SynthesizeTileSet(const Material& material, const Arrangement& arrangement,
-                                          const SynthesisParams& asked, const RunContext& context) {
-  TESSERA_RETURN_IF_ERROR(CheckSizes(material.width, material.height, SmallestSizes(asked)));
-  const size_t num_pixels = static_cast<size_t>(material.width) * material.height;
-  if (material.btfels.size() != num_pixels) {
-    return absl::InvalidArgumentError(absl::StrFormat(
-        "material: %d BTFels for %dx%d texels", material.btfels.size(), material.width, material.height));
+namespace {
+
+nlohmann::json DescribeFeatures(const std::vector<Feature>& features) {
+  nlohmann::json described = nlohmann::json::array();
+  for (const Feature& feature : features) {
+    described.push_back({{"name", feature.name},
+                         {"texels", feature.num_texels},
+                         {"box", {feature.box.x, feature.box.y, feature.box.width, feature.box.height}}});
   }
-  if (num_pixels > BtfelOfTexel(kNoTexel)) {
-    return absl::InvalidArgumentError(
-        absl::StrFormat("material %dx%d: more than 2^30 texels", material.width, material.height));
-  }
-  const Codec* const codec = FindCodec(material.btfels.codec_id);
-  if (codec == nullptr) {
-    return absl::InvalidArgumentError(absl::StrCat("unknown codec '", material.btfels.codec_id, "'"));
-  }
-  TESSERA_ASSIGN_OR_RETURN(const Embedding embedding, codec->Embed(material, kCutDims, context));
+  return described;
+}
+
+// The tile set of a material whose embedding and features are at hand.
+absl::StatusOr<TileSet> SynthesizeEmbedded(const Material& material, const Embedding& embedding,
+                                           const std::vector<Feature>& features,
+                                           const Arrangement& arrangement, const SynthesisParams& asked,
+                                           const RunContext& context) {
   const Exemplar exemplar(embedding, asked.seam_rule);
   TESSERA_ASSIGN_OR_RETURN(const MaterialPattern pattern, MeasurePattern(exemplar, context));
   if (arrangement.turned_strips && pattern.anisotropy > kAnisotropyLimit && !asked.force) {
@@ -242,7 +243,14 @@ absl::StatusOr<TileSet> SynthesizeTileSet(const Material& material, const Arrang
   }
   const SynthesisParams params = ChosenSizes(material, arrangement, pattern, asked);
 
-  TESSERA_ASSIGN_OR_RETURN(const IndexMaps maps, SynthesizeIndexMaps(exemplar, arrangement, params, context));
+  Controls controls;
+  if (params.recipe) {
+    TESSERA_RETURN_IF_ERROR(CheckRecipe(*params.recipe, arrangement, params.tile_size, params.strip_height));
+    TESSERA_ASSIGN_OR_RETURN(controls, MakeControls(*params.recipe, features, exemplar, arrangement,
+                                                    params.tile_size, params.strip_height));
+  }
+  TESSERA_ASSIGN_OR_RETURN(const IndexMaps maps,
+                           SynthesizeIndexMaps(exemplar, arrangement, params, context, controls));
 
   TileSet set = TileSetOfMaps(material, arrangement, maps, params);
   TESSERA_ASSIGN_OR_RETURN(Certificate certificate,
@@ -281,7 +289,48 @@ absl::StatusOr<TileSet> SynthesizeTileSet(const Material& material, const Arrang
   set.metadata["corners"] = {
       {"mean_mismatch", MismatchOfCost(static_cast<double>(maps.corner_cost)) /
                             static_cast<double>(std::max<int64_t>(1, maps.corner_seams) * cut_length)}};
+  if (params.recipe) {
+    set.metadata[kRecipeKey] = params.recipe->json;
+    set.metadata["features"] = DescribeFeatures(features);
+  }
   return set;
+}
+
+}  // namespace
+
+absl::StatusOr<TileSet> SynthesizeTileSet(const Material& material, const Arrangement& arrangement,
+                                          const SynthesisParams& params, const RunContext& context) {
+  TESSERA_RETURN_IF_ERROR(CheckSizes(material.width, material.height, SmallestSizes(params)));
+  if (params.recipe && params.method != SynthesisMethod::kFrame) {
+    return absl::InvalidArgumentError(absl::StrFormat(
+        "method \"%s\" takes no recipe, only \"%s\" does", std::string(SynthesisMethodName(params.method)),
+        std::string(SynthesisMethodName(SynthesisMethod::kFrame))));
+  }
+  const size_t num_pixels = static_cast<size_t>(material.width) * material.height;
+  if (material.btfels.size() != num_pixels) {
+    return absl::InvalidArgumentError(absl::StrFormat(
+        "material: %d BTFels for %dx%d texels", material.btfels.size(), material.width, material.height));
+  }
+  if (num_pixels > BtfelOfTexel(kNoTexel)) {
+    return absl::InvalidArgumentError(
+        absl::StrFormat("material %dx%d: more than 2^30 texels", material.width, material.height));
+  }
+  const Codec* const codec = FindCodec(material.btfels.codec_id);
+  if (codec == nullptr) {
+    return absl::InvalidArgumentError(absl::StrCat("unknown codec '", material.btfels.codec_id, "'"));
+  }
+  TESSERA_ASSIGN_OR_RETURN(const Embedding embedding, codec->Embed(material, kCutDims, context));
+  if (!params.recipe) {
+    return SynthesizeEmbedded(material, embedding, {}, arrangement, params, context);
+  }
+  TESSERA_ASSIGN_OR_RETURN(const std::vector<Feature> features, ExtractFeatures(embedding, *params.recipe));
+  if (params.recipe->colours.empty()) {
+    return SynthesizeEmbedded(material, embedding, features, arrangement, params, context);
+  }
+  Material recoloured = material;
+  TESSERA_RETURN_IF_ERROR(MoveColours(*params.recipe, features, recoloured));
+  TESSERA_ASSIGN_OR_RETURN(const Embedding moved, codec->Embed(recoloured, kCutDims, context));
+  return SynthesizeEmbedded(recoloured, moved, features, arrangement, params, context);
 }
 
 }  // namespace tessera

@@ -8,6 +8,7 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <string_view>
 
 #include <absl/status/statusor.h>
@@ -15,6 +16,7 @@
 #include "btf/base/run_context.h"
 #include "btf/codec/material.h"
 #include "btf/tiles/exemplar.h"
+#include "btf/tiles/recipe.h"
 #include "btf/wang/arrangement.h"
 #include "btf/wang/tile_set.h"
 
@@ -50,6 +52,7 @@ struct SynthesisParams {
   // each improvement. At least 1.
   int num_candidates = 8;
   DiamondParams diamonds;
+  std::optional<Recipe> recipe;  // of kFrame
   // A filled strip or tile must reach both. In units of the material's mean embedding distance of
   // neighbouring texels:
   double mean_threshold = 3.0;  // mean cost along cuts, a mismatch or its excess
@@ -58,13 +61,16 @@ struct SynthesisParams {
 };
 
 // Every texel of the result is a BTFel of `material` with a turn (0 throughout for "plane-*"); the table
-// keeps the referenced BTFels in ascending exemplar order. Same material, arrangement and parameters give the
-// same bytes for any number of threads. Metadata: seed, method, parameters, `pattern` (DescribePattern),
-// captured variance, thresholds and what was reached; `notes` and `warnings`, sentences: why a size was
-// chosen, and that tiles cannot keep a regular material's period. Certificate: see certificate.h.
+// keeps the referenced BTFels in ascending exemplar order. Colours of a recipe are moved first, on a copy of
+// the material, whose BTFels they then are. Same material, arrangement and parameters give the same bytes for
+// any number of threads. Metadata: seed, method, parameters, `pattern` (DescribePattern), captured variance,
+// thresholds and what was reached, the recipe and the features that it found; `notes` and `warnings`,
+// sentences: why a size was chosen, and that tiles cannot keep a regular material's period. Certificate: see
+// certificate.h.
 //
 // Errors, with reasons as in btf/base/reason.h: INVALID_ARGUMENT naming the size and its limit (reason
-// MATERIAL_TOO_SMALL when the exemplar is the cause) or an unknown codec; FAILED_PRECONDITION with reason
+// MATERIAL_TOO_SMALL when the exemplar is the cause), an unknown codec, or the recipe's key (features.h);
+// UNIMPLEMENTED when colours of a codec cannot be moved (codec/recolour.h); FAILED_PRECONDITION with reason
 // NOT_ISOTROPIC (turned strips only, unless forced) or THRESHOLD_NOT_REACHED (unless forced), each with its
 // figures; CANCELLED within one patch search. Progress: stages "corners", "strips", "tiles" and
 // "certificate"; of diamonds, whose thresholds are told but not enforced, "samples", "tiles" and
