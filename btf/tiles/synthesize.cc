@@ -245,7 +245,6 @@ absl::StatusOr<TileSet> SynthesizeEmbedded(const Material& material, const Embed
 
   Controls controls;
   if (params.recipe) {
-    TESSERA_RETURN_IF_ERROR(CheckRecipe(*params.recipe, arrangement, params.tile_size, params.strip_height));
     TESSERA_ASSIGN_OR_RETURN(controls, MakeControls(*params.recipe, features, exemplar, arrangement,
                                                     params.tile_size, params.strip_height));
   }

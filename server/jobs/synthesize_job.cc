@@ -7,6 +7,7 @@
 #include "btf/base/status_macros.h"
 #include "btf/codec/material.h"
 #include "btf/tiles/pattern.h"
+#include "btf/tiles/recipe.h"
 #include "btf/tiles/synthesize.h"
 #include "btf/wang/arrangement.h"
 #include "btf/wang/tile_set.h"
@@ -26,9 +27,13 @@ void FillDefaults(v1::SynthesizeTileSetRequest& request) {
   if (request.method().empty()) {
     request.set_method(std::string(SynthesisMethodName(SynthesisParams().method)));
   }
+  if (const absl::StatusOr<Recipe> recipe = ParseRecipe(request.recipe_json()); recipe.ok()) {
+    request.set_recipe_json(recipe->json.dump());
+  }
 }
 
-absl::Status CheckSynthesizeRequest(const v1::SynthesizeTileSetRequest& request) {
+absl::Status CheckSynthesizeRequest(const v1::SynthesizeTileSetRequest& request,
+                                    const Arrangement& arrangement) {
   v1::SynthesizeTileSetRequest filled = request;
   FillDefaults(filled);
   const auto refuse = [](const std::string& message, std::string_view field) {
@@ -56,7 +61,20 @@ absl::Status CheckSynthesizeRequest(const v1::SynthesizeTileSetRequest& request)
                                filled.method(), "\""),
                   "tile_size");
   }
-  return absl::OkStatus();
+  if (filled.recipe_json().empty()) {
+    return absl::OkStatus();
+  }
+  if (*method != SynthesisMethod::kFrame) {
+    return refuse(absl::StrCat("method \"", filled.method(), "\" takes no recipe"), "recipe_json");
+  }
+  const absl::StatusOr<Recipe> recipe = ParseRecipe(filled.recipe_json());
+  absl::Status checked = recipe.status();
+  // A size that the job chooses is the job's to check.
+  if (recipe.ok() && filled.tile_size() != 0 && filled.strip_height() != 0) {
+    checked = CheckRecipe(*recipe, arrangement, static_cast<int>(filled.tile_size()),
+                          static_cast<int>(filled.strip_height()));
+  }
+  return checked.ok() ? checked : refuse(std::string(checked.message()), "recipe_json");
 }
 
 absl::StatusOr<JobOutput> RunSynthesizeJob(const JobInput& input, const JobContext& context) {
@@ -76,6 +94,9 @@ absl::StatusOr<JobOutput> RunSynthesizeJob(const JobInput& input, const JobConte
   params.seed = request.seed();
   params.force = request.force();
   TESSERA_ASSIGN_OR_RETURN(params.method, ParseSynthesisMethod(request.method()));
+  if (!request.recipe_json().empty()) {
+    TESSERA_ASSIGN_OR_RETURN(params.recipe, ParseRecipe(request.recipe_json()));
+  }
   TESSERA_ASSIGN_OR_RETURN(TileSet tile_set, SynthesizeTileSet(material, *arrangement, params, context.run));
   tile_set.metadata[kMaterialDigestKey] = input.inputs[0];
   TESSERA_ASSIGN_OR_RETURN(std::string container, SerializeTileSet(tile_set));

@@ -7,6 +7,7 @@
 #include <absl/status/status.h>
 #include <absl/status/statusor.h>
 
+#include "btf/wang/arrangement.h"
 #include "server/jobs/job.h"
 #include "tessera/v1/tessera.pb.h"
 
@@ -15,10 +16,11 @@ namespace tessera {
 // Key of a tile set's metadata: the digest of the container of the material it was made of.
 inline constexpr char kMaterialDigestKey[] = "material_sha256";
 
-// What can be refused before the job is queued. Errors: INVALID_ARGUMENT naming the field and its legal
-// values.
-[[nodiscard]] absl::Status CheckSynthesizeRequest(const v1::SynthesizeTileSetRequest& request);
-// Defaults for what is 0 or empty, so that equal requests become equal bytes.
+// What can be refused before the job is queued, of a request for this arrangement. Errors: INVALID_ARGUMENT
+// naming the field and its legal values, or the recipe's key.
+[[nodiscard]] absl::Status CheckSynthesizeRequest(const v1::SynthesizeTileSetRequest& request,
+                                                  const Arrangement& arrangement);
+// Defaults for what is 0 or empty, and one spelling of a recipe, so that equal requests become equal bytes.
 void FillDefaults(v1::SynthesizeTileSetRequest& request);
 // Errors: ParseMaterial's and SynthesizeTileSet's.
 [[nodiscard]] absl::StatusOr<JobOutput> RunSynthesizeJob(const JobInput& input, const JobContext& context);

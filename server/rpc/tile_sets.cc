@@ -23,8 +23,8 @@ absl::StatusOr<v1::Job> TileSetsService::SynthesizeTileSet(
   const bool takes_material_name = request.name().ends_with('/');
   TESSERA_ASSIGN_OR_RETURN(
       const TileSetId id, ParseTileSetName(takes_material_name ? request.name() + material : request.name()));
-  TESSERA_RETURN_IF_ERROR(FindArrangement(id.arrangement).status());
-  TESSERA_RETURN_IF_ERROR(CheckSynthesizeRequest(request));
+  TESSERA_ASSIGN_OR_RETURN(const Arrangement* const arrangement, FindArrangement(id.arrangement));
+  TESSERA_RETURN_IF_ERROR(CheckSynthesizeRequest(request, *arrangement));
   v1::Job earlier;
   TESSERA_ASSIGN_OR_RETURN(const bool answered, FindEarlierAnswer(backend_, "SynthesizeTileSet",
                                                                   request.request_id(), request, earlier));

@@ -12,6 +12,7 @@
 #include <gtest/gtest.h>
 
 #include "btf/codec/material.h"
+#include "server/jobs/synthesize_job.h"
 #include "tests/server/support/server_fixture.h"
 #include "tests/support/btf_files.h"
 
@@ -128,6 +129,19 @@ TEST_F(ServerTest, WrongArgumentsAreRefusedBeforeAnyJob) {
   const absl::Status unknown =
       Stubs::Call(&v1::TileSets::Stub::SynthesizeTileSet, *stubs_->tile_sets, synthesis).status();
   EXPECT_NE(unknown.message().find("unknown method \"hexagon\", known: frame"), std::string::npos) << unknown;
+  synthesis.set_method("frame");
+  synthesis.set_recipe_json(R"({"colours": [{"of": "background", "hue_deg": 20}]})");
+  EXPECT_EQ(synthesize(), "NOT_FOUND");
+  synthesis.set_recipe_json(R"({"corners": [{"strip": {"colour": 1}, "end": "end", "position": [1, 1]}]})");
+  const absl::Status misfit =
+      Stubs::Call(&v1::TileSets::Stub::SynthesizeTileSet, *stubs_->tile_sets, synthesis).status();
+  EXPECT_EQ(ReasonOf(misfit), "ARGUMENT_INVALID");
+  EXPECT_NE(misfit.message().find("corners[0].strip.orientation: missing"), std::string::npos) << misfit;
+  synthesis.set_method("diamond-cut");
+  synthesis.set_recipe_json("{}");
+  EXPECT_EQ(synthesize(), "ARGUMENT_INVALID") << "diamonds take no recipe";
+  synthesis.clear_recipe_json();
+  synthesis.set_method("hexagon");
   synthesis.set_name("arrangements/nowhere/tileSets/");
   EXPECT_EQ(synthesize(), "NOT_FOUND");
 
@@ -140,6 +154,21 @@ TEST_F(ServerTest, WrongArgumentsAreRefusedBeforeAnyJob) {
   EXPECT_EQ(import_reason(), "BLOB_MISSING");
   import.set_transfer("gamma:-1");
   EXPECT_EQ(import_reason(), "ARGUMENT_INVALID");
+}
+
+TEST(SynthesizeRequestTest, RecipesSpelledDifferentlyAreOneJob) {
+  v1::SynthesizeTileSetRequest a;
+  v1::SynthesizeTileSetRequest b;
+  FillDefaults(a);
+  EXPECT_TRUE(a.recipe_json().empty());
+  a.set_recipe_json(R"({"colours": [{"of": "background", "hue_deg": 20}]})");
+  b.set_recipe_json(R"( { "colours":[{"hue_deg":20,"of":"background"}]})");
+  FillDefaults(a);
+  FillDefaults(b);
+  EXPECT_EQ(a.SerializeAsString(), b.SerializeAsString());
+  b.set_recipe_json(R"({"colours": [{"of": "background", "hue_deg": 21}]})");
+  FillDefaults(b);
+  EXPECT_NE(a.SerializeAsString(), b.SerializeAsString());
 }
 
 TEST_F(ServerTest, AnArchiveThatIsNoneFailsItsJobWithoutShowingPaths) {
