@@ -1,4 +1,4 @@
-// tessera material import | generate | list | show | pull | decode | delete
+// tessera material import | generate | list | show | pull | decode | mask | delete
 #include <filesystem>
 #include <memory>
 
@@ -15,6 +15,7 @@
 #include "client/cli/commands.h"
 #include "client/cli/describe.h"
 #include "client/cli/exit_codes.h"
+#include "client/cli/mask.h"
 #include "client/cli/pattern.h"
 #include "client/lib/flat_decode.h"
 #include "client/lib/names.h"
@@ -460,6 +461,7 @@ void AddMaterialCommands(CLI::App& app, Session& session) {
   });
 
   AddDecode(*noun, session);
+  AddMaskCommand(*noun, session);
 
   CLI::App* remove = noun->add_subcommand("delete", "Free the name; tile sets made from it stay");
   remove->add_option("MATERIAL", *name, "Name of the material")->required();

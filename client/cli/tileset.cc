@@ -12,6 +12,7 @@
 #include "client/cli/certificate.h"
 #include "client/cli/commands.h"
 #include "client/cli/describe.h"
+#include "client/cli/mask.h"
 #include "client/cli/pattern.h"
 #include "client/lib/names.h"
 
@@ -26,6 +27,7 @@ struct SynthesizeFlags {
   uint32_t strip_height = 0;
   uint64_t seed = 1;
   std::string method = "frame";
+  std::string recipe;
   bool force = false;
   bool detach = false;
   bool replace = false;
@@ -66,6 +68,11 @@ absl::Status RunSynthesize(Session& session, const SynthesizeFlags& flags) {
   TESSERA_ASSIGN_OR_RETURN(const std::string material, FullMaterialName(flags.material));
   const std::string own_name = flags.name.empty() ? ShortName(material) : flags.name;
   TESSERA_ASSIGN_OR_RETURN(const std::string name, FullTileSetName(flags.arrangement + "/" + own_name));
+  std::string recipe_json;
+  if (!flags.recipe.empty()) {
+    TESSERA_ASSIGN_OR_RETURN(const Recipe recipe, ReadRecipeFile(flags.recipe));
+    recipe_json = recipe.json.dump();
+  }
   TESSERA_ASSIGN_OR_RETURN(Client * client, session.Connect());
   const RunContext context = session.Context();
   v1::SynthesizeTileSetRequest request;
@@ -75,6 +82,7 @@ absl::Status RunSynthesize(Session& session, const SynthesizeFlags& flags) {
   request.set_strip_height(flags.strip_height);
   request.set_seed(flags.seed);
   request.set_method(flags.method);
+  request.set_recipe_json(recipe_json);
   request.set_force(flags.force);
   request.set_replace(flags.replace);
   TESSERA_ASSIGN_OR_RETURN(const v1::Job job, client->SynthesizeTileSet(request, context));
@@ -268,6 +276,8 @@ void AddSynthesize(CLI::App& noun, Session& session) {
                    "frame, or a baseline: four diamonds cut by dynamic programming or by a minimum cut")
       ->check(CLI::IsMember({"frame", "diamond-dp", "diamond-cut"}))
       ->capture_default_str();
+  command->add_option("--recipe", flags->recipe,
+                      "JSON file of features to place, corner samples and colours: btf/tiles/RECIPE.md");
   command->add_flag("--force", flags->force, "Turn strips of a material that is not isotropic all the same");
   command->add_flag("--detach", flags->detach, "Print the job and return at once");
   command->add_flag("--replace", flags->replace, "Take a name that exists");

@@ -297,6 +297,38 @@ class MainJobTest(harness.CommandTest):
         self.assertIn(result.code, (5, 6), result)
         self.assertEqual(json.loads(result.err.splitlines()[-1])["error"]["reason"], "MATERIAL_TOO_SMALL", result)
 
+    def test_d_synthesize_by_a_recipe(self):
+        feature = {"name": "spot", "rectangle": [20, 20, 12, 12]}
+        recipe = {"features": [feature], "colours": [{"of": "spot", "hue_deg": 150, "saturation": 1.5}]}
+        (self.folder / "recipe.json").write_text(json.dumps(recipe))
+        mask = self.run_json("material", "mask", "leopard", "--recipe", "recipe.json", "-o", "mask.png")
+        self.assertEqual(mask["features"][0]["name"], "spot")
+        x, y, width, height = mask["features"][0]["box"]
+        self.assertTrue(20 <= x and 20 <= y and x + width <= 32 and y + height <= 32, mask)
+        self.assertGreater(self.picture("mask.png")[2], 20)
+        # In the upper left corner of a tile's inside, as much of the feature as fits there.
+        recipe["placements"] = [{"feature": "spot", "tile": 165, "position": [1, 1]}]
+        (self.folder / "recipe.json").write_text(json.dumps(recipe))
+        made = self.run_json("tileset", "synthesize", "leopard", *SYNTHESIZE, "--force", "--name", "by-recipe",
+                             "--recipe", "recipe.json")["tile_set"]
+        self.assertEqual(made["metadata"]["recipe"], recipe)
+        self.assertEqual(made["metadata"]["features"], mask["features"])
+        again = self.run_json("tileset", "certify", "surface-96/by-recipe")["certificate"]
+        self.assertEqual(again, made["certificate"])
+        recipe["placements"][0]["position"] = [9, 9]
+        recipe["placements"].append({"feature": "spot", "tile": 165, "position": [8, 8]})
+        (self.folder / "recipe.json").write_text(json.dumps(recipe))
+        self.assert_fails(6, "tileset", "synthesize", "leopard", *SYNTHESIZE, "--force", "--name", "x", "--recipe", "recipe.json",
+                          says="placements[0].position: feature \"spot\" would cover")
+        recipe["placements"][0]["tile"] = 1
+        (self.folder / "recipe.json").write_text(json.dumps(recipe))
+        self.assert_fails(5, "tileset", "synthesize", "leopard", *SYNTHESIZE, "--force", "--name", "x", "--recipe", "recipe.json",
+                          reason="ARGUMENT_INVALID", says="placements[0].tile: 1 is not the code of a tile")
+        (self.folder / "recipe.json").write_text('{"placement": []}')
+        self.assert_fails(5, "material", "mask", "leopard", "--recipe", "recipe.json", "-o", "no.png",
+                          says="recipe.json: placement: unknown key")
+        self.run_ok("tileset", "delete", "surface-96/by-recipe")
+
     def test_e_dress_and_redress(self):
         self.assertEqual([a["name"] for a in self.run_json("arrangement", "list")["arrangements"]],
                          ["plane-16", "plane-81", "surface-26", "surface-96"])
