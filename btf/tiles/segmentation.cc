@@ -279,6 +279,24 @@ Points PointsWhere(const ModelView& view, const std::vector<uint8_t>& mask, uint
   return points;
 }
 
+// 1 where a texel that is not the feature tells what the background looks like: with a rectangle, only inside
+// it and in a band around it, for farther off the material may show the same feature again.
+std::vector<uint8_t> Evidence(const ModelView& view, const std::optional<Window>& rectangle) {
+  if (!rectangle) {
+    return std::vector<uint8_t>(view.points.size(), 1);
+  }
+  std::vector<uint8_t> evidence(view.points.size(), 0);
+  const int band = std::max(2, std::max(rectangle->width, rectangle->height) / 8);
+  const int end_x = std::min(view.width, rectangle->x + rectangle->width + band);
+  const int end_y = std::min(view.height, rectangle->y + rectangle->height + band);
+  for (int y = std::max(0, rectangle->y - band); y < end_y; ++y) {
+    for (int x = std::max(0, rectangle->x - band); x < end_x; ++x) {
+      evidence[view.Index(x, y)] = 1;
+    }
+  }
+  return evidence;
+}
+
 // The half of all texels that lies farther from the nearest of `known`, at least one point, than the others.
 // Of many points, some stand for all.
 Points FarthestHalf(const ModelView& view, const Points& known) {
@@ -429,9 +447,10 @@ absl::StatusOr<std::vector<uint8_t>> SegmentFeature(const Embedding& embedding,
   const bool has_strokes = !guide.feature.empty();
   std::vector<uint8_t> first(claims.size());
   std::vector<uint8_t> rest(claims.size());
+  const std::vector<uint8_t> evidence = Evidence(view, guide.rectangle);
   for (size_t i = 0; i < claims.size(); ++i) {
     first[i] = claims[i] == Claim::kFeature || (!has_strokes && claims[i] == Claim::kFree) ? 1 : 0;
-    rest[i] = claims[i] == Claim::kBackground ? 1 : 0;
+    rest[i] = claims[i] == Claim::kBackground && evidence[i] != 0 ? 1 : 0;
   }
   Points in = PointsWhere(view, first, 1);
   Points out = PointsWhere(view, rest, 1);
@@ -448,7 +467,9 @@ absl::StatusOr<std::vector<uint8_t>> SegmentFeature(const Embedding& embedding,
       break;
     }
     in = PointsWhere(view, mask, 1);
-    out = PointsWhere(view, mask, 0);
+    std::transform(mask.begin(), mask.end(), evidence.begin(), rest.begin(),
+                   [](uint8_t is_feature, uint8_t tells) { return is_feature == 0 ? tells : 0; });
+    out = PointsWhere(view, rest, 1);
   }
   if (!in.empty() && !out.empty()) {
     Tidy(view, claims, has_strokes, mask);

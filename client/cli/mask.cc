@@ -79,7 +79,8 @@ absl::StatusOr<Recipe> ReadRecipeFile(const std::string& path) {
   TESSERA_ASSIGN_OR_RETURN(const std::string text, ReadWholeFile(path));
   absl::StatusOr<Recipe> recipe = ParseRecipe(text);
   if (!recipe.ok()) {
-    return absl::Status(recipe.status().code(), fmt::format("{}: {}", path, recipe.status().message()));
+    return absl::Status(recipe.status().code(),
+                        fmt::format("{}: {}", path, std::string(recipe.status().message())));
   }
   return recipe;
 }

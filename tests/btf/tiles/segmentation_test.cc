@@ -44,6 +44,19 @@ TEST(SegmentationTest, ARectangleFindsTheDiscInIt) {
   EXPECT_GT(Overlap(Segment({.rectangle = Window{5, 3, 19, 19}}), kDisc), 0.95);
 }
 
+TEST(SegmentationTest, ARectangleFindsTheDiscInItThoughManyLookTheSame) {
+  std::vector<Disc> discs;
+  for (const double y : {6.0, 20.0, 34.0}) {
+    for (const double x : {8.0, 24.0, 40.0}) {
+      discs.push_back({x, y, 4.2});
+    }
+  }
+  const auto mask =
+      SegmentFeature(DiscEmbedding(kWidth, kHeight, 3, discs), {.rectangle = Window{18, 14, 13, 13}});
+  ASSERT_TRUE(mask.ok()) << mask.status();
+  EXPECT_GT(Overlap(*mask, discs[4]), 0.95);
+}
+
 TEST(SegmentationTest, AStrokeFindsItsDiscAndNotTheOtherThatLooksTheSame) {
   const std::vector<uint8_t> mask = Segment({.feature = {{{12, 12}, {16, 12}}}});
   EXPECT_GT(Overlap(mask, kDisc), 0.95);
