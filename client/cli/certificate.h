@@ -13,7 +13,7 @@ namespace tessera::cli {
 inline constexpr double kSeamRatioLimit = 1.5;
 
 // Planes of tiles in which a regular material's period keeps less than this of its autocorrelation are out of
-// step: generated weave keeps 0.97 where tiles are in step and 0.36 where they are half a period off.
+// step: generated weave keeps 0.98 where tiles are in step and 0.38 where they are half a period off.
 inline constexpr double kPeriodKeptLimit = 0.8;
 
 // A table of seams beside what random cuts score, and lines on repetition and use of the material. Figures
