@@ -298,7 +298,7 @@ class MainJobTest(harness.CommandTest):
         self.assertEqual(json.loads(result.err.splitlines()[-1])["error"]["reason"], "MATERIAL_TOO_SMALL", result)
 
     def test_d_synthesize_by_a_recipe(self):
-        feature = {"name": "spot", "rectangle": [20, 20, 12, 12]}
+        feature = {"name": "spot", "rectangle": [20, 20, 12, 12], "seeds": {"feature": [[[24, 26], [27, 26]]]}}
         recipe = {"features": [feature], "colours": [{"of": "spot", "hue_deg": 150, "saturation": 1.5}]}
         (self.folder / "recipe.json").write_text(json.dumps(recipe))
         mask = self.run_json("material", "mask", "leopard", "--recipe", "recipe.json", "-o", "mask.png")
@@ -315,8 +315,7 @@ class MainJobTest(harness.CommandTest):
         self.assertEqual(made["metadata"]["features"], mask["features"])
         again = self.run_json("tileset", "certify", "surface-96/by-recipe")["certificate"]
         self.assertEqual(again, made["certificate"])
-        recipe["placements"][0]["position"] = [9, 9]
-        recipe["placements"].append({"feature": "spot", "tile": 165, "position": [8, 8]})
+        recipe["placements"][0]["position"] = [15, 9]
         (self.folder / "recipe.json").write_text(json.dumps(recipe))
         self.assert_fails(6, "tileset", "synthesize", "leopard", *SYNTHESIZE, "--force", "--name", "x", "--recipe", "recipe.json",
                           says="placements[0].position: feature \"spot\" would cover")
