@@ -184,7 +184,8 @@ absl::StatusOr<int> ReadFeatureName(const Json& value, const std::string& path, 
 absl::StatusOr<RecipeStrip> ReadStrip(const Json& value, const std::string& path) {
   TESSERA_RETURN_IF_ERROR(CheckKeys(value, path, {"colour"}, {"orientation"}));
   RecipeStrip strip;
-  TESSERA_ASSIGN_OR_RETURN(strip.colour, ReadWhole(value["colour"], KeyPath(path, "colour"), 0, 1));
+  TESSERA_ASSIGN_OR_RETURN(strip.colour,
+                           ReadWhole(value["colour"], KeyPath(path, "colour"), 0, kMostColours - 1));
   if (value.contains("orientation")) {
     if (value["orientation"] == "horizontal") {
       strip.orientation = StripOrientation::kHorizontal;
@@ -273,6 +274,11 @@ absl::Status CheckStrip(const RecipeStrip& strip, const std::string& path, const
   if (!arrangement.turned_strips && strip.orientation == StripOrientation::kEither) {
     return Refusal(KeyPath(path, "orientation"),
                    absl::StrCat("missing: the strips of ", arrangement.id, " are horizontal or vertical"));
+  }
+  if (strip.colour >= arrangement.num_colours) {
+    return Refusal(KeyPath(path, "colour"),
+                   absl::StrFormat("%d, but %s has the colours 0 to %d", strip.colour, arrangement.id,
+                                   arrangement.num_colours - 1));
   }
   return absl::OkStatus();
 }

@@ -68,12 +68,13 @@ absl::Status CheckSynthesizeRequest(const v1::SynthesizeTileSetRequest& request,
     return refuse(absl::StrCat("method \"", filled.method(), "\" takes no recipe"), "recipe_json");
   }
   const absl::StatusOr<Recipe> recipe = ParseRecipe(filled.recipe_json());
-  absl::Status checked = recipe.status();
-  // A size that the job chooses is the job's to check.
-  if (recipe.ok() && filled.tile_size() != 0 && filled.strip_height() != 0) {
-    checked = CheckRecipe(*recipe, arrangement, static_cast<int>(filled.tile_size()),
-                          static_cast<int>(filled.strip_height()));
-  }
+  // A size that the job will choose is taken at its largest here; the job checks again.
+  const int recipe_tile =
+      filled.tile_size() == 0 ? static_cast<int>(kMaxTileSize) : static_cast<int>(filled.tile_size());
+  const int recipe_strip =
+      filled.strip_height() == 0 ? recipe_tile / 2 : static_cast<int>(filled.strip_height());
+  const absl::Status checked =
+      recipe.ok() ? CheckRecipe(*recipe, arrangement, recipe_tile, recipe_strip) : recipe.status();
   return checked.ok() ? checked : refuse(std::string(checked.message()), "recipe_json");
 }
 

@@ -23,7 +23,7 @@ namespace tessera {
 namespace {
 
 constexpr std::chrono::milliseconds kContextPoll{20};
-constexpr double kTexelsWithoutMips = 2.0;  // along a pixel's side
+constexpr double kTexelsWithoutMips = 4.0;  // along a pixel's side
 
 absl::Status Refuse(const std::string& message, std::string_view field) {
   return WithReason(absl::InvalidArgumentError(message), "ARGUMENT_INVALID", field);

@@ -77,8 +77,8 @@ TEST(RecipeTest, RefusesByThePathOfTheKey) {
        "placements[0].feature: the background cannot be placed"},
       {R"({"features": [{"name": "a", "rectangle": [1, 1, 4, 4]}], "placements": [{"feature": "a", "position": [1, 1]}]})",
        "placements[0]: needs one of strip and tile"},
-      {R"({"corners": [{"strip": {"colour": 2}, "end": "start", "position": [1, 1]}]})",
-       "corners[0].strip.colour: 2, expected a whole number in [0, 1]"},
+      {R"({"corners": [{"strip": {"colour": 127}, "end": "start", "position": [1, 1]}]})",
+       "corners[0].strip.colour: 127, expected a whole number in [0, 126]"},
       {R"({"corners": [{"strip": {"colour": 1}, "end": "top", "position": [1, 1]}]})",
        "corners[0].end: expected \"start\" or \"end\""},
       {R"({"colours": [{"of": "background", "hue_deg": 361}]})",
@@ -126,6 +126,11 @@ TEST(RecipeTest, WhatTheArrangementLacksIsRefused) {
   EXPECT_EQ(
       message(R"({"feature": "a", "strip": {"colour": 0}, "position": [9, 0], "turn": 3})", "surface-96"),
       "");
+  const char* const third =
+      R"({"feature": "a", "strip": {"colour": 2, "orientation": "vertical"}, "position": [9, 0]})";
+  EXPECT_EQ(message(third, "plane-81"), "");
+  EXPECT_THAT(message(third, "plane-16"),
+              StartsWith("placements[0].strip.colour: 2, but plane-16 has the colours 0 to 1"));
   EXPECT_THAT(message(R"({"feature": "a", "tile": 165, "position": [9, 0], "turn": 3})", "plane-16"),
               StartsWith("placements[0].turn: 3: nothing is turned in plane-16"));
   EXPECT_THAT(message(R"({"feature": "a", "tile": 1, "position": [9, 0]})", "plane-16"),
