@@ -1,6 +1,6 @@
 // Where in the exemplar a window of the canvas finds patches like itself: all offsets of all turns at once,
-// by FFT cross-correlation over the embedding, then a choice among the best. Of a large exemplar each search
-// sees one region, so that its price is the windows' affair and not the exemplar's.
+// by cross-correlation of spectra over the embedding, then a choice among the best. Of a large exemplar each
+// search sees one region, so that its price is the windows' affair and not the exemplar's.
 //
 // With weights w and wanted points c, the cost of an offset is sum w |c - e|^2 = sum w |c|^2 - 2 sum (w c) e
 // + sum w |e|^2: one correlation a dimension and one with |e|^2, added up as spectra.

@@ -1,6 +1,6 @@
 // Two-dimensional transforms of real planes of size x size that are zero beyond a corner, as products with
-// matrices of cosines and sines. At the sizes of regions (candidates.h) a matrix product does many times the
-// arithmetic of a fast transform at many times its speed, and only what is not zero or is wanted takes part.
+// matrices of cosines and sines: at the sizes of regions (candidates.h) their arithmetic is dear but regular,
+// and only what is not zero or is wanted takes part.
 // Spectra are [2 size][channel][columns]: the real parts of all rows, then the imaginary parts; columns are
 // those up to the Nyquist frequency.
 #pragma once

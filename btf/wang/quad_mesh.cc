@@ -102,7 +102,7 @@ std::vector<HalfEdge> SortedHalfEdges(const QuadMesh& mesh) {
       }
     }
   };
-  // By the lower vertex through counts, then the few edges of each: several times faster than one sort.
+  // By the lower vertex through counts, then the few edges of each.
   std::vector<uint32_t> ends(mesh.positions.size() + 1, 0);
   visit([&](const HalfEdge& edge) { ++ends[edge.low + 1]; });
   std::partial_sum(ends.begin(), ends.end(), ends.begin());
