@@ -49,7 +49,7 @@ Plan PlanOf(ChartSize size) {
             .num_seeds = 1,
             .dims = {4, 32, kMostDims},
             .draws = {1, 256},
-            .patches = {1, 8},
+            .patches = {1, 16},
             .strip_heights = {8, 16}};
   }
   return {.most_side = 256,
@@ -58,7 +58,7 @@ Plan PlanOf(ChartSize size) {
           .num_seeds = 3,
           .dims = {2, 4, 8, 16, 32, kMostDims},
           .draws = {1, 16, 256, 2048},
-          .patches = {1, 3, 8},
+          .patches = {1, 4, 16},
           .strip_heights = {8, 16, 32}};
 }
 

@@ -321,7 +321,7 @@ diamonds are pieces of the exemplar, so that only their ends can have seams.</li
 <li><b>Mismatch of seams</b>: half the sum of |a - b'| and |a' - b| within tiles, over the root mean square distance of two texels
 drawn at random, in the same dimensions. Layers are the principal components of the SH coefficients, the largest first.</li>
 <li><b>Time</b>: wall clock from the embedding to the tiles, spectra of the exemplar included, the certificate not.</li>
-<li>One parameter varies, the others stay: 32 layers, 256 draws at most or 8 patches. Points are means over the seeds that the
+<li>One parameter varies, the others stay: 32 layers, 256 draws at most or 16 patches. Points are means over the seeds that the
 table has for them: up to three for the common setting and for the layers of diamonds, which depend on a few samples.</li>
 </ul>
 )";

@@ -12,9 +12,10 @@
 namespace tessera {
 namespace {
 
-// Regions, in texels: windows of three features leave a quarter of four to move in, and an exemplar of the
-// usual size is one. A very large exemplar has larger ones, lest their spectra outgrow it.
-constexpr int kSmallestRegion = 128;
+// Regions, in texels: first windows leave more than a quarter of four features to move in, and an exemplar of
+// the usual size is one. A very large exemplar has larger ones, lest their spectra outgrow it.
+constexpr int kLargestWhole = 128;
+constexpr int kSmallestRegion = 96;
 constexpr int kRegionFeatures = 4;
 constexpr int kMaxRegionsAcross = 4;
 
@@ -64,6 +65,9 @@ void AddCorrelation(const Eigen::MatrixXf& query, const Eigen::MatrixXf& exempla
 
 int RegionSide(const Exemplar& exemplar, int feature_size) {
   const int longer = std::max(exemplar.width(), exemplar.height());
+  if (longer <= kLargestWhole) {
+    return longer;
+  }
   return std::max({kSmallestRegion, kRegionFeatures * feature_size, longer / kMaxRegionsAcross});
 }
 

@@ -27,6 +27,9 @@ constexpr double kNearnessPrice = 6.0;
 // mesh shows corner samples, so one that is bland or striking would draw the grid.
 constexpr double kMeanPrice = 0.2;
 constexpr double kVariancePrice = 0.3;
+// Of the vertex texel against the one across the border, beside the pairs of the cut: most borders have no
+// other seams than at their ends.
+constexpr int kVertexWeight = 2;
 constexpr double kTemperature = 0.02;  // of the draw, in mean steps
 constexpr int kTypicalDraws = 256;     // random samples that tell what is typical
 
@@ -101,7 +104,7 @@ CornerCut CutPair(const Exemplar& exemplar, const std::vector<Patch>& samples, c
   // Across side `in`, the neighbouring tile shows the other half of that strip up to the vertex, here `out`
   // does.
   const uint32_t across = TexelOf(exemplar, samples, InTexel(pair, -1, 0, strip_height));
-  cut.cost += PairCost(exemplar, out[(half - 1) * half], across, GridCut::kLeft);
+  cut.cost += kVertexWeight * PairCost(exemplar, out[(half - 1) * half], across, GridCut::kLeft);
   for (int j = 0; j < half; ++j) {
     for (int i = 0; i < half; ++i) {
       cut.in_wins[static_cast<size_t>(j) * half + i] = grid.OnSourceSide(i, half - j) ? 0 : 1;

@@ -3,9 +3,11 @@
 #include <algorithm>
 #include <array>
 #include <limits>
+#include <numeric>
 #include <optional>
 #include <utility>
 
+#include "btf/base/parallel.h"
 #include "btf/base/rng.h"
 #include "btf/base/status_macros.h"
 
@@ -21,26 +23,27 @@ constexpr double kWantedOverlap = 0.15;
 constexpr int kKeptPerCut = 3;  // candidates that a search keeps for each that is cut
 
 // How a window is matched. First windows bring most of the content, so they range far and pay for repetition;
-// improvements look for the best fit.
+// improvements look for the best fit, and for several.
 struct Matching {
-  int trials = 0;            // candidates that are cut, of eight asked for
   double repetition = 0.0;   // price of a patch used as often as the mean
   double temperature = 0.0;  // of the draw among candidates
   int separation = 0;        // of candidates, in eighths of a feature
-  bool must_improve = false;
+  int halves = 2;            // of the candidates asked for
 };
-constexpr Matching kFirst = {
-    .trials = 8, .repetition = 1.0, .temperature = 0.3, .separation = 4, .must_improve = false};
-constexpr Matching kImprove = {
-    .trials = 3, .repetition = 0.1, .temperature = 0.1, .separation = 1, .must_improve = true};
+constexpr Matching kFirst = {.repetition = 1.0, .temperature = 0.3, .separation = 4, .halves = 1};
+constexpr Matching kImprove = {.repetition = 0.1, .temperature = 1.0, .separation = 1};
 
-constexpr double kFixedWeight = 2.0;  // of texels that will stay, against free ones
-constexpr double kSeamDoubt = 2.0;    // how fast a texel's weight falls with its mismatch in mean steps
-// Improvements tried for each h x h of free texels; at least and, while thresholds are missed, at most.
-constexpr int kPatchesPerFeature = 5;
-constexpr int kFewestPatches = 24;
+constexpr double kFixedWeight = 2.0;   // of texels that will stay, against free ones
+constexpr double kFailureDoubt = 0.3;  // how fast a texel is drawn less with windows that changed nothing
+constexpr double kSeamDoubt = 2.0;     // how fast a texel's weight falls with its mismatch in mean steps
+constexpr int kMostHalfFeatures = 4;   // sides of windows that improve: one to four halves of a feature
+// Windows tried for each h x h of free texels, unless the canvas is good before; at least and, while
+// thresholds are missed, at most.
+constexpr int kWindowsPerFeature = 4;
+constexpr int kFewestWindows = 24;
 constexpr int kPatience = 4;           // times as many while a threshold is missed
-constexpr int kFruitlessPatches = 24;  // improvements in a row that fail before a good canvas is left alone
+constexpr double kGoodRatio = 1.0;     // FillReport::step_ratio of a canvas that is good
+constexpr int kWindowsPerMeasure = 8;  // a canvas is measured once for so many
 
 enum FillSeed : uint64_t { kLaySeed = 1, kImproveSeed = 2 };
 
@@ -87,26 +90,77 @@ Window FirstWindow(const Canvas& canvas, int largest, int feature_size) {
   return chosen;
 }
 
-// A free texel drawn in proportion to the square of its dearest seam; none when there are no seams.
-std::optional<std::array<int, 2>> DrawBadTexel(const Canvas& canvas, Rng& rng) {
-  std::vector<double> sums(static_cast<size_t>(canvas.width()) * canvas.height());
-  double total = 0.0;
-  for (int y = 0; y < canvas.height(); ++y) {
-    for (int x = 0; x < canvas.width(); ++x) {
-      const double cost = canvas.fixed(x, y) ? 0.0 : canvas.TexelCost(x, y);
-      total += cost * cost;
-      sums[static_cast<size_t>(y) * canvas.width() + x] = total;
+// Draws free texels in proportion to the square of their dearest seam, the less often the more often windows
+// centred near them changed nothing.
+class BadTexels {
+ public:
+  explicit BadTexels(const Canvas& canvas)
+      : canvas_(&canvas),
+        failures_(static_cast<size_t>(canvas.width()) * canvas.height(), 0),
+        row_weights_(canvas.height(), 0.0) {
+    WeighRows(0, canvas.height());
+  }
+
+  // None when there are no seams.
+  [[nodiscard]] std::optional<std::array<int, 2>> Draw(Rng& rng) const {
+    const double total = std::accumulate(row_weights_.begin(), row_weights_.end(), 0.0);
+    if (total == 0.0) {
+      return std::nullopt;
+    }
+    double draw = rng.NextDouble() * total;
+    int y = 0;
+    while (y + 1 < canvas_->height() && draw >= row_weights_[y]) {
+      draw -= row_weights_[y++];
+    }
+    int x = 0;
+    while (x + 1 < canvas_->width() && draw >= WeightOf(x, y)) {
+      draw -= WeightOf(x++, y);
+    }
+    return std::array<int, 2>{x, y};
+  }
+
+  // Call when a window centred on `texel` changed nothing.
+  void Fail(const std::array<int, 2>& texel, int feature_size) {
+    const int reach = feature_size / 4;
+    for (int y = std::max(0, texel[1] - reach); y <= std::min(canvas_->height() - 1, texel[1] + reach); ++y) {
+      for (int x = std::max(0, texel[0] - reach); x <= std::min(canvas_->width() - 1, texel[0] + reach);
+           ++x) {
+        ++failures_[Index(x, y)];
+      }
+    }
+    WeighRows(texel[1] - reach, texel[1] + reach + 1);
+  }
+
+  // Call when the canvas has changed in the window.
+  void Change(const Window& window) {
+    for (int y = window.y; y < window.y + window.height; ++y) {
+      std::fill_n(failures_.begin() + static_cast<std::ptrdiff_t>(Index(window.x, y)), window.width, 0);
+    }
+    WeighRows(window.y - 1, window.y + window.height + 1);
+  }
+
+ private:
+  [[nodiscard]] size_t Index(int x, int y) const { return static_cast<size_t>(y) * canvas_->width() + x; }
+
+  [[nodiscard]] double WeightOf(int x, int y) const {
+    const double cost = canvas_->fixed(x, y) ? 0.0 : canvas_->TexelCost(x, y);
+    const double weight = cost / (1.0 + kFailureDoubt * failures_[Index(x, y)]);
+    return weight * weight;
+  }
+
+  void WeighRows(int first, int end) {
+    for (int y = std::max(0, first); y < std::min(canvas_->height(), end); ++y) {
+      row_weights_[y] = 0.0;
+      for (int x = 0; x < canvas_->width(); ++x) {
+        row_weights_[y] += WeightOf(x, y);
+      }
     }
   }
-  const double draw = rng.NextDouble() * total;
-  if (total == 0.0) {
-    return std::nullopt;
-  }
-  const auto index = std::upper_bound(sums.begin(), sums.end(), draw) - sums.begin();
-  const int clamped =
-      static_cast<int>(std::min<std::ptrdiff_t>(index, static_cast<std::ptrdiff_t>(sums.size()) - 1));
-  return std::array<int, 2>{clamped % canvas.width(), clamped / canvas.width()};
-}
+
+  const Canvas* canvas_;
+  std::vector<int> failures_;  // by texel
+  std::vector<double> row_weights_;
+};
 
 void MakeQuery(const Canvas& canvas, const Window& window, SearchQuery& query) {
   const Exemplar& exemplar = canvas.exemplar();
@@ -131,50 +185,78 @@ void MakeQuery(const Canvas& canvas, const Window& window, SearchQuery& query) {
   }
 }
 
-// Searches patches for the window, cuts some of the best and keeps the cheapest, one that repeats a sibling
-// only when the window must be filled and all of them do. Returns how many texels it changed.
-int MatchWindow(const ExemplarSpectra& spectra, const FillParams& params, const Window& window,
-                const Matching& matching, const std::stop_token& stop, Rng& rng, FillerScratch& scratch,
-                Canvas& canvas, FillReport& report) {
+// Patches for the window, drawn among those that fit it best.
+std::vector<Candidate> DrawPatches(const ExemplarSpectra& spectra, const FillParams& params,
+                                   const Window& window, const Matching& matching, const Canvas& canvas,
+                                   const RunContext& context, Rng& rng, FillerScratch& scratch) {
   MakeQuery(canvas, window, scratch.query);
   const int separation = std::max(1, matching.separation * params.feature_size / 8);
   const int first_region = spectra.DrawRegion(rng);
   std::vector<Candidate> candidates;
   // Where texels are excluded, a region may have nothing to give.
-  for (int i = 0; i < spectra.num_regions() && candidates.empty() && !stop.stop_requested(); ++i) {
+  for (int i = 0; i < spectra.num_regions() && candidates.empty() && !context.stop.stop_requested(); ++i) {
     candidates = scratch.search.Search(scratch.query, (first_region + i) % spectra.num_regions(),
                                        params.turns, params.usage, matching.repetition,
-                                       kKeptPerCut * params.num_candidates, separation, stop);
+                                       kKeptPerCut * params.num_candidates, separation, context.stop);
   }
-  const int trials = (matching.trials * params.num_candidates + 7) / 8;
-  candidates = SampleCandidates(std::move(candidates), trials, matching.temperature, rng);
-  std::optional<Patch> best_patch;
+  const int count = (params.num_candidates * matching.halves + 1) / 2;
+  return SampleCandidates(std::move(candidates), count, matching.temperature, rng);
+}
+
+bool Repeats(const FillParams& params, const Canvas& canvas, const Window& window, const Patch& patch,
+             const PatchCut& cut) {
+  return params.siblings != nullptr && params.siblings->Repeats(canvas.exemplar(), window, patch, cut);
+}
+
+void Keep(const Window& window, const Patch& patch, const PatchCut& cut, Canvas& canvas, FillReport& report) {
+  PatchCutter::Apply(window, patch, cut, canvas);
+  ++report.num_kept;
+  report.num_truncated += cut.num_truncated;
+}
+
+// Lays the cheapest patch that repeats no sibling, or the cheapest of all where every one does. Returns
+// whether any texel changed.
+bool FillWindow(const FillParams& params, const Window& window, const std::vector<Candidate>& candidates,
+                FillerScratch& scratch, Canvas& canvas, FillReport& report) {
+  const Patch* best_patch = nullptr;
   PatchCut best_cut;
-  bool best_repeats = false;
+  bool best_repeats = true;
   for (const Candidate& candidate : candidates) {
-    const PatchCut& cut = scratch.cutter.Cut(canvas, window, candidate.patch);
+    const int64_t limit = best_repeats ? kAnyChange : best_cut.cost_change;
+    const PatchCut& cut = scratch.cutter.Cut(canvas, window, candidate.patch, limit);
     ++report.num_patches;
-    if (cut.num_new == 0 || (matching.must_improve && cut.cost_change >= 0)) {
+    if (cut.num_new == 0) {
       continue;
     }
-    const bool repeats = params.siblings != nullptr &&
-                         params.siblings->Repeats(canvas.exemplar(), window, candidate.patch, cut);
-    if (repeats && matching.must_improve) {
-      continue;
-    }
-    if (!best_patch || std::pair(repeats, cut.cost_change) < std::pair(best_repeats, best_cut.cost_change)) {
-      best_patch = candidate.patch;
+    const bool repeats = Repeats(params, canvas, window, candidate.patch, cut);
+    if (best_patch == nullptr ||
+        std::pair(repeats, cut.cost_change) < std::pair(best_repeats, best_cut.cost_change)) {
+      best_patch = &candidate.patch;
       best_cut = cut;
       best_repeats = repeats;
     }
   }
-  if (!best_patch) {
-    return 0;
+  if (best_patch == nullptr) {
+    return false;
   }
-  PatchCutter::Apply(window, *best_patch, best_cut, canvas);
-  ++report.num_kept;
-  report.num_truncated += best_cut.num_truncated;
-  return best_cut.num_new;
+  Keep(window, *best_patch, best_cut, canvas, report);
+  return true;
+}
+
+// Lays every patch that makes the canvas cheaper and repeats no sibling: one search serves several. Returns
+// whether there was any.
+bool ImproveWindow(const FillParams& params, const Window& window, const std::vector<Candidate>& candidates,
+                   FillerScratch& scratch, Canvas& canvas, FillReport& report) {
+  bool improved = false;
+  for (const Candidate& candidate : candidates) {
+    const PatchCut& cut = scratch.cutter.Cut(canvas, window, candidate.patch, 0);
+    ++report.num_patches;
+    if (cut.num_new > 0 && !Repeats(params, canvas, window, candidate.patch, cut)) {
+      Keep(window, candidate.patch, cut, canvas, report);
+      improved = true;
+    }
+  }
+  return improved;
 }
 
 }  // namespace
@@ -191,6 +273,7 @@ FillReport MeasureCanvas(const Canvas& canvas, const FillParams& params) {
     report.mean_mismatch =
         MismatchOfCost(static_cast<double>(totals.cost)) / static_cast<double>(totals.num_seams);
   }
+  report.step_ratio = totals.own_step > 0.0 ? totals.step / totals.own_step : 0.0;
   report.largest_mismatch = MismatchOfCost(totals.largest_cost) * exemplar.mean_step() / exemplar.spread();
   report.reached = canvas.num_unfilled() == 0 && report.mean_mismatch <= params.mean_threshold &&
                    report.largest_mismatch <= params.texel_threshold;
@@ -198,11 +281,8 @@ FillReport MeasureCanvas(const Canvas& canvas, const FillParams& params) {
 }
 
 void Filler::Lay(const Window& window, const Patch& patch, Canvas& canvas, FillReport& report) {
-  const PatchCut& cut = scratch_.cutter.Cut(canvas, window, patch);
   ++report.num_patches;
-  ++report.num_kept;
-  report.num_truncated += cut.num_truncated;
-  PatchCutter::Apply(window, patch, cut, canvas);
+  Keep(window, patch, scratch_.cutter.Cut(canvas, window, patch), canvas, report);
 }
 
 void Filler::LayAround(const PlacedFeature& feature, int margin, Canvas& canvas, FillReport& report) {
@@ -250,10 +330,10 @@ absl::Status Filler::LayEmpty(const FillParams& params, const RunContext& contex
   const int first = FirstWindowSide(*spectra_, params.feature_size);
   while (canvas.num_unfilled() > 0) {
     const Window window = FirstWindow(canvas, first, params.feature_size);
-    const int changed =
-        MatchWindow(*spectra_, params, window, kFirst, context.stop, rng, scratch_, canvas, report);
+    const std::vector<Candidate> patches =
+        DrawPatches(*spectra_, params, window, kFirst, canvas, context, rng, scratch_);
     TESSERA_RETURN_IF_ERROR(context.CheckStop());
-    if (changed == 0) {
+    if (!FillWindow(params, window, patches, scratch_, canvas, report)) {
       return absl::InternalError("no patch covers the empty part of a canvas");
     }
   }
@@ -270,30 +350,37 @@ absl::Status Filler::Improve(const FillParams& params, const RunContext& context
       num_free += canvas.fixed(x, y) ? 0 : 1;
     }
   }
-  const int feature_area = params.feature_size * params.feature_size;
-  const int budget = std::max(kFewestPatches, kPatchesPerFeature * num_free / feature_area);
-  int fruitless = 0;
-  for (int round = 0; round < budget * kPatience; ++round) {
-    if ((round >= budget || fruitless >= kFruitlessPatches) && MeasureCanvas(canvas, params).reached) {
-      break;
+  const int64_t num_features = num_free / (params.feature_size * params.feature_size);
+  const int64_t budget = params.effort * std::max<int64_t>(kFewestWindows, kWindowsPerFeature * num_features);
+  BadTexels bad_texels(canvas);
+  for (int64_t round = 0; round < budget * kPatience; ++round) {
+    if (round % kWindowsPerMeasure == 0) {
+      const FillReport measured = MeasureCanvas(canvas, params);
+      if (measured.reached && (round >= budget || measured.step_ratio <= kGoodRatio)) {
+        break;
+      }
     }
-    const auto focus = DrawBadTexel(canvas, rng);
+    const auto focus = bad_texels.Draw(rng);
     if (!focus) {
       break;
     }
-    // 1, 1.5, 2 or 3 features wide and high, centred on the bad texel as far as the canvas allows.
-    constexpr std::array<int, 4> kHalfFeatures = {2, 3, 4, 6};
-    const int wanted = kHalfFeatures[rng.NextBelow(kHalfFeatures.size())] * params.feature_size / 2;
+    // Centred on the bad texel as far as the canvas allows.
+    const int wanted = (1 + static_cast<int>(rng.NextBelow(kMostHalfFeatures))) * params.feature_size / 2;
     Window window{0, 0, std::min({wanted, largest, canvas.width()}),
                   std::min({wanted, largest, canvas.height()})};
     window.x = std::clamp((*focus)[0] - window.width / 2, 0, canvas.width() - window.width);
     window.y = std::clamp((*focus)[1] - window.height / 2, 0, canvas.height() - window.height);
-    const int changed =
-        MatchWindow(*spectra_, params, window, kImprove, context.stop, rng, scratch_, canvas, report);
-    fruitless = changed > 0 ? 0 : fruitless + 1;
+    const std::vector<Candidate> patches =
+        DrawPatches(*spectra_, params, window, kImprove, canvas, context, rng, scratch_);
     TESSERA_RETURN_IF_ERROR(context.CheckStop());
+    if (ImproveWindow(params, window, patches, scratch_, canvas, report)) {
+      bad_texels.Change(window);
+    } else {
+      bad_texels.Fail(*focus, params.feature_size);
+    }
   }
   const FillReport measured = MeasureCanvas(canvas, params);
+  report.step_ratio = measured.step_ratio;
   report.mean_mismatch = measured.mean_mismatch;
   report.largest_mismatch = measured.largest_mismatch;
   report.reached = measured.reached;

@@ -2,9 +2,10 @@
 // enough [Kwatra2003], [Leung2007] 3.2 step 2.
 //
 // First windows of two and a half features are laid where most is still empty and enough is known around;
-// then windows centred on bad seams (drawn in proportion to the square of their cost) are matched again, cut,
-// and kept if the canvas gets cheaper. Old seams take part in every cut (seam_graph.h). An unfilled texel
-// counts as infinitely wrong, so a canvas is never accepted with one.
+// then smaller ones centred on bad seams (drawn in proportion to the square of their cost, those less that
+// were tried in vain) are matched again, and every patch is kept that makes the canvas cheaper, until its
+// seams show no more than the material's own steps. Old seams take part in every cut (seam_graph.h). An
+// unfilled texel counts as infinitely wrong, so a canvas is never accepted with one.
 #pragma once
 
 #include <cstdint>
@@ -22,11 +23,12 @@ namespace tessera {
 
 struct FillParams {
   std::vector<int> turns;  // that patches may have
-  int feature_size = 16;   // h: windows are one to three of it
+  int feature_size = 16;   // h: windows are half to two and a half of it
   uint64_t seed = 1;
   double mean_threshold = 0.0;         // of FillReport.mean_mismatch
   double texel_threshold = 0.0;        // of FillReport.largest_mismatch
-  int num_candidates = 8;              // SynthesisParams::num_candidates
+  int num_candidates = 16;             // SynthesisParams::num_candidates
+  int effort = 1;                      // SynthesisParams::effort
   const UsageMap* usage = nullptr;     // makes places used often dearer
   const Siblings* siblings = nullptr;  // patches that repeat one are laid only where no other was found
 };
@@ -34,6 +36,7 @@ struct FillParams {
 struct FillReport {
   double mean_mismatch = 0.0;     // over the seams, in mean steps of the exemplar
   double largest_mismatch = 0.0;  // of one seam pair, in spreads of the exemplar
+  double step_ratio = 0.0;        // of the steps across seams to those that the patches have there
   bool reached = false;           // both at most their thresholds
   int64_t num_truncated = 0;      // pairs of kept patches whose table was not submodular
   int num_patches = 0;            // tried

@@ -20,6 +20,7 @@ namespace {
 constexpr int kSmallestExemplar = 32;
 // The BTFel number of a packed texel has 30 bits; tiles of 16,384 texels are far beyond any use.
 constexpr int kLargestTile = 16384;
+constexpr int kTilesAtOnce = 4;  // laid without knowing each other
 
 enum SeedStage : uint64_t { kCornerSeed = 1, kStripSeed = 2, kTileSeed = 3 };
 
@@ -67,6 +68,10 @@ absl::Status CheckSizes(int exemplar_width, int exemplar_height, const Synthesis
   if (params.num_candidates < 1) {
     return absl::InvalidArgumentError(
         absl::StrFormat("%d candidates: must be at least 1", params.num_candidates));
+  }
+  if (params.effort < 1 || params.effort > kMostEffort) {
+    return absl::InvalidArgumentError(
+        absl::StrFormat("effort %d: must be in [1, %d]", params.effort, kMostEffort));
   }
   if (params.method != SynthesisMethod::kFrame) {
     return CheckDiamondSizes(exemplar_width, exemplar_height, params);
@@ -123,9 +128,9 @@ absl::StatusOr<IndexMaps> SynthesizeIndexMaps(const Exemplar& exemplar, const Ar
 
   std::mutex mutex;
   int done = 0;
-  const auto count_one = [&](std::string_view stage, int total) {
+  const auto count_one = [&](std::string_view stage, std::string_view unit, int total) {
     const std::lock_guard lock(mutex);
-    context.Report(stage, ++done, total, stage);
+    context.Report(stage, ++done, total, unit);
   };
   const auto fill_params = [&](uint64_t stage, int item) {
     FillParams fill;
@@ -134,6 +139,7 @@ absl::StatusOr<IndexMaps> SynthesizeIndexMaps(const Exemplar& exemplar, const Ar
     fill.mean_threshold = params.mean_threshold;
     fill.texel_threshold = params.texel_threshold;
     fill.num_candidates = params.num_candidates;
+    fill.effort = params.effort;
     return fill;
   };
 
@@ -144,7 +150,7 @@ absl::StatusOr<IndexMaps> SynthesizeIndexMaps(const Exemplar& exemplar, const Ar
     fill.turns = TurnsOfStrip(arrangement, strip);
     statuses[strip] = SynthesizeStrip(spectra, corners, controls.on_strip(strip), strip, size, fill, context,
                                       maps.strips[strip]);
-    count_one("strips", num_strips);
+    count_one("strips", "strips", num_strips);
   });
   TESSERA_RETURN_IF_ERROR(context.CheckStop());
   for (int strip = 0; strip < num_strips; ++strip) {
@@ -153,9 +159,9 @@ absl::StatusOr<IndexMaps> SynthesizeIndexMaps(const Exemplar& exemplar, const Ar
         CheckReached(maps.strips[strip].report, params, absl::StrFormat("strip %d", strip)));
   }
 
-  // So that tiles do not repeat each other, and do not depend on the number of threads: they are laid one
-  // after the other, each knowing those before it; then all are improved, which is nineteen parts in twenty
-  // of the work, each knowing the others as they were laid.
+  // So that tiles do not repeat each other, and do not depend on the number of threads: they are laid some at
+  // once, each knowing those that were laid before these, and one that turns out to repeat another is laid
+  // anew; then all are improved, which is most of the work, each knowing the others as they were laid.
   UsageMap usage(exemplar.width(), exemplar.height());
   const auto texels_of = [&](int tile) {
     return std::span(maps.texels).subspan(tile * tile_area, tile_area);
@@ -169,18 +175,36 @@ absl::StatusOr<IndexMaps> SynthesizeIndexMaps(const Exemplar& exemplar, const Ar
     fill.siblings = &siblings;
     return fill;
   };
-  Filler filler(spectra);
-  for (int tile = 0; tile < num_tiles; ++tile) {
-    const std::span<uint32_t> texels = texels_of(tile);
-    const std::vector<uint32_t> frame =
-        BuildFrame(arrangement, arrangement.SidesOf(tile), corners, maps.strips);
-    std::copy(frame.begin(), frame.end(), texels.begin());
-    const Siblings siblings(maps.texels, size, margin, tile, turns_of_tiles);
-    TESSERA_RETURN_IF_ERROR(LayInterior(exemplar, size, controls.on_tile(tile), tile_params(tile, siblings),
-                                        context, filler, texels, maps.tile_reports[tile]));
-    // Insides only: how often a strip is shown is the arrangement's affair.
-    for (int y = margin; y < size - margin; ++y) {
-      usage.Count(texels.subspan(static_cast<size_t>(y) * size + margin, size - 2 * margin));
+  done = 0;
+  statuses.assign(num_tiles, absl::OkStatus());
+  const auto first_tiles = [&](int count) {
+    return std::span<const uint32_t>(maps.texels).first(count * tile_area);
+  };
+  // Knowing the first `num_known` tiles.
+  const auto lay = [&](int tile, int num_known) {
+    std::ranges::copy(BuildFrame(arrangement, arrangement.SidesOf(tile), corners, maps.strips),
+                      texels_of(tile).begin());
+    const Siblings siblings(first_tiles(num_known), size, margin, tile, turns_of_tiles);
+    Filler filler(spectra);
+    statuses[tile] = LayInterior(exemplar, size, controls.on_tile(tile), tile_params(tile, siblings), context,
+                                 filler, texels_of(tile), maps.tile_reports[tile]);
+  };
+  for (int first = 0; first < num_tiles; first += kTilesAtOnce) {
+    const int end = std::min(num_tiles, first + kTilesAtOnce);
+    ParallelFor(context, first, end, 1, [&](int64_t begin, int64_t) {
+      lay(static_cast<int>(begin), first);
+      count_one("laying", "tiles", num_tiles);
+    });
+    for (int tile = first; tile < end; ++tile) {
+      TESSERA_RETURN_IF_ERROR(context.CheckStop());
+      if (Siblings(first_tiles(tile), size, margin, tile, turns_of_tiles).Repeats(texels_of(tile))) {
+        lay(tile, tile);
+      }
+      TESSERA_RETURN_IF_ERROR(statuses[tile]);
+      // Insides only: how often a strip is shown is the arrangement's affair.
+      for (int y = margin; y < size - margin; ++y) {
+        usage.Count(texels_of(tile).subspan(static_cast<size_t>(y) * size + margin, size - 2 * margin));
+      }
     }
     usage.Finish();
   }
@@ -193,7 +217,7 @@ absl::StatusOr<IndexMaps> SynthesizeIndexMaps(const Exemplar& exemplar, const Ar
     Filler filler(spectra);
     statuses[tile] = ImproveInterior(exemplar, size, controls.on_tile(tile), tile_params(tile, siblings),
                                      context, filler, texels_of(tile), maps.tile_reports[tile]);
-    count_one("tiles", num_tiles);
+    count_one("tiles", "tiles", num_tiles);
   });
   TESSERA_RETURN_IF_ERROR(context.CheckStop());
   for (int tile = 0; tile < num_tiles; ++tile) {

@@ -16,18 +16,21 @@ void GridCut::Reset(int width, int height) {
   nodes_.assign(static_cast<size_t>(stride_) * (height + 2), Node{});
 }
 
-int64_t GridCut::Solve() {
+int64_t GridCut::Solve(int64_t enough) {
   const int64_t num_nodes = static_cast<int64_t>(width_) * height_;
   // Heights leave no gaps, so there are at most as many as nodes.
   num_at_height_.resize(num_nodes + 1);
   // Measured once for as many nodes raised as there are: both take about the same time.
-  while (MeasureHeights()) {
+  while (flow_ < enough && MeasureHeights()) {
     while (num_raised_ < num_nodes && !next_active_.empty()) {
       active_.swap(next_active_);
       next_active_.clear();
       for (const uint32_t index : active_) {
         if (nodes_[index].height != kNoWay) {
           Discharge(index);
+        }
+        if (flow_ >= enough) {
+          return flow_;
         }
       }
     }

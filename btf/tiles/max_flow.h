@@ -56,8 +56,9 @@ class GridCut {
     node.excess += added;
   }
 
-  // The value of the minimum cut. Call once after setting up.
-  int64_t Solve();
+  // The value of the minimum cut. Call once after setting up. Where every cut costs `enough` or more, it may
+  // end early with a value of at least that, and the sides mean nothing.
+  int64_t Solve(int64_t enough = INT64_MAX);
 
   // After Solve: the side of the minimum cut that (x, y) lies on, of several the one whose sink side is
   // least.

@@ -8,7 +8,7 @@ namespace {
 
 // Under SeamRule::kExcess, what a broken continuation costs beside a step that shows at once. At 0 cuts end
 // features wherever the texels on both sides happen to be alike; at 1 they avoid that at any price.
-constexpr float kContinuity = 0.3f;
+constexpr float kContinuity = 0.15f;
 
 // Of the seam between a and b, from the mismatches of its two texels, summed, and the own steps of its two
 // patches, summed.
@@ -27,6 +27,13 @@ float Mismatch(const Exemplar& exemplar, uint32_t a, uint32_t b) {
 }
 
 }  // namespace
+
+float OwnStep(const Exemplar& exemplar, uint32_t a, uint32_t b, int direction) {
+  const bool a_goes_on = exemplar.Step(a, direction) != kNoTexel;
+  const bool b_goes_on = exemplar.Step(b, direction ^ 2) != kNoTexel;
+  const float sum = exemplar.StepLength(a, direction) + exemplar.StepLength(b, direction ^ 2);
+  return a_goes_on && b_goes_on ? 0.5f * sum : sum;
+}
 
 int PairCost(const Exemplar& exemplar, uint32_t a, uint32_t b, int direction) {
   const uint32_t a_at_b = exemplar.Step(a, direction);
@@ -103,8 +110,11 @@ Canvas::Totals Canvas::Measure() const {
         totals.largest_cost = std::max(totals.largest_cost, cost);
         const uint32_t here = texel(x, y);
         const uint32_t there = texel(other_x, other_y);
-        totals.num_seams +=
-            here != kNoTexel && there != kNoTexel && exemplar_->Step(here, direction) != there ? 1 : 0;
+        if (here != kNoTexel && there != kNoTexel && exemplar_->Step(here, direction) != there) {
+          ++totals.num_seams;
+          totals.step += exemplar_->Distance(here, there);
+          totals.own_step += OwnStep(*exemplar_, here, there, direction);
+        }
       };
       if (x + 1 < width_) {
         add(right_cost(x, y), x + 1, y, GridCut::kRight);
@@ -117,7 +127,8 @@ Canvas::Totals Canvas::Measure() const {
   return totals;
 }
 
-const PatchCut& PatchCutter::Cut(const Canvas& canvas, const Window& window, const Patch& patch) {
+const PatchCut& PatchCutter::Cut(const Canvas& canvas, const Window& window, const Patch& patch,
+                                 int64_t most_change) {
   const Exemplar& exemplar = canvas.exemplar();
   const int width = window.width;
   const int height = window.height;
@@ -132,22 +143,23 @@ const PatchCut& PatchCutter::Cut(const Canvas& canvas, const Window& window, con
       const uint32_t old_texel = canvas.texel(window.x + x, window.y + y);
       new_texels_[index] = exemplar.TexelAt(patch.turn, patch.u + x, patch.v + y);
       if (old_texel == kNoTexel) {
-        grid_.AddTerminals(x, y, 0, GridCut::kPinned);
+        grid_.AddTerminals(x, y, GridCut::kPinned, 0);
       } else {
         distance_[index] = Mismatch(exemplar, old_texel, new_texels_[index]);
         if (canvas.fixed(window.x + x, window.y + y)) {
-          grid_.AddTerminals(x, y, GridCut::kPinned, 0);
+          grid_.AddTerminals(x, y, 0, GridCut::kPinned);
         }
       }
     }
   }
 
-  // Source side keeps the old texel, sink side takes the new one. `constant` collects what the reduction
+  // Source side takes the new texel, sink side keeps the old one: what old seams would save is little beside
+  // what the window's border costs, so little is pushed. `constant` collects what the reduction
   // takes out of the terminals; the cost before is `before`.
   int64_t constant = 0;
   int64_t before = 0;
   const auto add_unary = [&](int x, int y, int cost_if_new) {
-    grid_.AddTerminals(x, y, std::max(0, cost_if_new), std::max(0, -cost_if_new));
+    grid_.AddTerminals(x, y, std::max(0, -cost_if_new), std::max(0, cost_if_new));
     constant += std::min(0, cost_if_new);
   };
   // Mixed cost of old `from` beside new `to`: mismatch at both, which is the distance there unless an old
@@ -179,7 +191,7 @@ const PatchCut& PatchCutter::Cut(const Canvas& canvas, const Window& window, con
       edge = 0;
       ++cut_.num_truncated;
     }
-    grid_.SetEdge(x, y, static_cast<GridCut::Direction>(direction), edge, 0);
+    grid_.SetEdge(x, y, static_cast<GridCut::Direction>(direction), 0, edge);
   };
   const auto add_outside = [&](int x, int y, int direction, int other_x, int other_y, int old_cost) {
     const uint32_t outside = canvas.texel(other_x, other_y);
@@ -214,12 +226,15 @@ const PatchCut& PatchCutter::Cut(const Canvas& canvas, const Window& window, con
       }
     }
   }
-  cut_.cost_change = grid_.Solve() + constant - before;
+  cut_.cost_change = grid_.Solve(most_change - constant + before) + constant - before;
+  if (cut_.cost_change >= most_change) {
+    return cut_;
+  }
   for (int y = 0; y < height; ++y) {
     for (int x = 0; x < width; ++x) {
       const size_t index = static_cast<size_t>(y) * width + x;
       const bool is_new =
-          !grid_.OnSourceSide(x, y) && canvas.texel(window.x + x, window.y + y) != new_texels_[index];
+          grid_.OnSourceSide(x, y) && canvas.texel(window.x + x, window.y + y) != new_texels_[index];
       cut_.takes_new[index] = is_new ? 1 : 0;
       cut_.num_new += is_new ? 1 : 0;
     }

@@ -72,6 +72,9 @@ class Canvas {
     int64_t cost = 0;       // over all pairs
     int64_t num_seams = 0;  // pairs that do not continue each other
     int largest_cost = 0;
+    // Of the seams: their steps, and the mean of the two steps that the patches have there of their own.
+    double step = 0.0;
+    double own_step = 0.0;
   };
   // Pairs between two fixed texels are left out: nothing can change them.
   [[nodiscard]] Totals Measure() const;
@@ -113,12 +116,16 @@ struct PatchCut {
   int num_truncated = 0;  // pairs whose table was not submodular
 };
 
+inline constexpr int64_t kAnyChange = int64_t{1} << 60;
+
 // Cuts patches into a canvas. Keeps scratch memory: one per thread.
 class PatchCutter {
  public:
   // The cheapest choice of old and new in the window: fixed texels stay, unfilled ones become new. The patch
-  // must lie inside its turned exemplar and the window inside the canvas.
-  const PatchCut& Cut(const Canvas& canvas, const Window& window, const Patch& patch);
+  // must lie inside its turned exemplar and the window inside the canvas. Where every choice changes the cost
+  // by `most_change` or more, nothing is taken and cost_change is at least that.
+  const PatchCut& Cut(const Canvas& canvas, const Window& window, const Patch& patch,
+                      int64_t most_change = kAnyChange);
 
   static void Apply(const Window& window, const Patch& patch, const PatchCut& cut, Canvas& canvas);
 

@@ -10,16 +10,9 @@
 namespace tessera {
 namespace {
 
-// Share of a window: patches that stay below it make no two insides look alike, and those that continue a
-// frame shared with a sibling still fit.
+// Share of a window, or of an inside: patches that stay below it make no two insides look alike, and those
+// that continue a frame shared with a sibling still fit.
 constexpr double kMostRepeated = 0.15;
-
-// A texel the cut brings, and where in a tile.
-struct NewTexel {
-  int x = 0;
-  int y = 0;
-  uint32_t texel = kNoTexel;
-};
 
 }  // namespace
 
@@ -32,7 +25,7 @@ bool Siblings::Repeats(const Exemplar& exemplar, const Window& window, const Pat
   const int first_y = std::max(window.y, margin_);
   const int end_x = std::min(window.x + window.width, size_ - margin_);
   const int end_y = std::min(window.y + window.height, size_ - margin_);
-  std::vector<NewTexel> brought;
+  std::vector<Shown> brought;
   for (int y = first_y; y < end_y; ++y) {
     for (int x = first_x; x < end_x; ++x) {
       const size_t in_window = static_cast<size_t>(y - window.y) * window.width + (x - window.x);
@@ -42,8 +35,22 @@ bool Siblings::Repeats(const Exemplar& exemplar, const Window& window, const Pat
       }
     }
   }
-  const double limit = kMostRepeated * window.width * window.height;
-  if (static_cast<double>(brought.size()) <= limit) {
+  return AnyShows(brought, kMostRepeated * window.width * window.height);
+}
+
+bool Siblings::Repeats(std::span<const uint32_t> tile) const {
+  std::vector<Shown> inside;
+  for (int y = margin_; y < size_ - margin_; ++y) {
+    for (int x = margin_; x < size_ - margin_; ++x) {
+      inside.push_back({x, y, tile[static_cast<size_t>(y) * size_ + x]});
+    }
+  }
+  return AnyShows(inside, kMostRepeated * static_cast<double>(inside.size()));
+}
+
+// Whether one sibling shows more than `limit` of the texels.
+bool Siblings::AnyShows(const std::vector<Shown>& texels, double limit) const {
+  if (static_cast<double>(texels.size()) <= limit) {
     return false;
   }
   const size_t tile_area = static_cast<size_t>(size_) * size_;
@@ -51,7 +58,7 @@ bool Siblings::Repeats(const Exemplar& exemplar, const Window& window, const Pat
   std::vector<std::pair<size_t, uint32_t>> wanted;  // index in a sibling, texel there
   for (const int turns : turns_) {
     wanted.clear();
-    for (const NewTexel& at : brought) {
+    for (const Shown& at : texels) {
       const auto [x, y] = TilePixelBeforeTurns(at.x, at.y, turns, size_);
       wanted.emplace_back(static_cast<size_t>(y) * size_ + x, TurnTexel(at.texel, 4 - turns));
     }

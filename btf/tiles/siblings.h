@@ -24,8 +24,18 @@ class Siblings {
   // Cost: the window's texels times the tiles times their turns.
   [[nodiscard]] bool Repeats(const Exemplar& exemplar, const Window& window, const Patch& patch,
                              const PatchCut& cut) const;
+  // Does a whole tile, [size][size], show more than 15% of its inside in place in one and the same sibling?
+  [[nodiscard]] bool Repeats(std::span<const uint32_t> tile) const;
 
  private:
+  // A texel, and where in the tile `self`.
+  struct Shown {
+    int x = 0;
+    int y = 0;
+    uint32_t texel = 0;
+  };
+  [[nodiscard]] bool AnyShows(const std::vector<Shown>& texels, double limit) const;
+
   std::span<const uint32_t> texels_;
   int size_;
   int margin_;

@@ -267,6 +267,7 @@ absl::StatusOr<TileSet> SynthesizeEmbedded(const Material& material, const Embed
                                 {"texel_threshold", params.texel_threshold},
                                 {"seam_rule", params.seam_rule == SeamRule::kExcess ? "excess" : "mismatch"},
                                 {"num_candidates", params.num_candidates},
+                                {"effort", params.effort},
                                 {"force", params.force}};
   set.metadata["exemplar"] = {{"width", material.width}, {"height", material.height}};
   set.metadata["captured_variance"] = {{"search_dims", exemplar.search_dims()},

@@ -38,6 +38,8 @@ struct DiamondParams {
   int num_draws = 256;  // sets drawn while none is; then the best of them is taken
 };
 
+inline constexpr int kMostEffort = 100;
+
 struct SynthesisParams {
   // SynthesizeTileSet chooses what is 0 from the material, by TileSizeFor and StripHeightFor of pattern.h.
   int tile_size = 64;     // w, texels, at least 2 h; even for diamonds
@@ -48,9 +50,12 @@ struct SynthesisParams {
   bool force = false;
   SynthesisMethod method = SynthesisMethod::kFrame;
   SeamRule seam_rule = SeamRule::kExcess;
-  // Patches cut for each first window, the cheapest of which is laid; three eighths of it, rounded up, for
-  // each improvement. At least 1.
-  int num_candidates = 8;
+  // Patches cut for each window that is improved; half of it, rounded up, for each that is filled. At
+  // least 1.
+  int num_candidates = 16;
+  // How many times as many windows are tried while seams show more than the material's own steps do. In
+  // [1, kMostEffort].
+  int effort = 1;
   DiamondParams diamonds;
   std::optional<Recipe> recipe;  // of kFrame
   // A filled strip or tile must reach both. In units of the material's mean embedding distance of

@@ -69,9 +69,10 @@ std::vector<std::string> CertificateWarnings(const Json& certificate) {
     }
     const auto ratio = certificate.at(at).get<double>();
     if (ratio > kSeamRatioLimit) {
-      warnings.push_back(fmt::format(
-          "seams of the {} read {:.2f}, above the limit of {:.2f}: look at `tileset sheet --heat`", part,
-          ratio, kSeamRatioLimit));
+      warnings.push_back(
+          fmt::format("seams of the {} read {:.2f}, above the limit of {:.2f}: look at `tileset sheet "
+                      "--heat`, raise --effort",
+                      part, ratio, kSeamRatioLimit));
     }
   }
   const Json::json_pointer kept("/repetition/period/kept");

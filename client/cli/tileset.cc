@@ -8,6 +8,7 @@
 #include "btf/image/image_io.h"
 #include "btf/mips/tile_mips.h"
 #include "btf/render/sheet.h"
+#include "btf/tiles/synthesize.h"
 #include "client/cli/arguments.h"
 #include "client/cli/certificate.h"
 #include "client/cli/commands.h"
@@ -26,6 +27,7 @@ struct SynthesizeFlags {
   uint32_t tile_size = 0;
   uint32_t strip_height = 0;
   uint64_t seed = 1;
+  uint32_t effort = 1;
   std::string method = "frame";
   std::string recipe;
   bool force = false;
@@ -81,6 +83,7 @@ absl::Status RunSynthesize(Session& session, const SynthesizeFlags& flags) {
   request.set_tile_size(flags.tile_size);
   request.set_strip_height(flags.strip_height);
   request.set_seed(flags.seed);
+  request.set_effort(flags.effort);
   request.set_method(flags.method);
   request.set_recipe_json(recipe_json);
   request.set_force(flags.force);
@@ -271,6 +274,12 @@ void AddSynthesize(CLI::App& noun, Session& session) {
   command->add_option("--strip", flags->strip_height,
                       "Height of the strips in texels: even, from 8 [the material's feature size]");
   command->add_option("--seed", flags->seed, "Same seed, same tile set")->capture_default_str();
+  command
+      ->add_option("--effort", flags->effort,
+                   "How many times as long seams are improved while they show more than the material's own "
+                   "steps")
+      ->check(CLI::Range(1, kMostEffort))
+      ->capture_default_str();
   command
       ->add_option("--method", flags->method,
                    "frame, or a baseline: four diamonds cut by dynamic programming or by a minimum cut")

@@ -27,6 +27,9 @@ void FillDefaults(v1::SynthesizeTileSetRequest& request) {
   if (request.method().empty()) {
     request.set_method(std::string(SynthesisMethodName(SynthesisParams().method)));
   }
+  if (request.effort() == 0) {
+    request.set_effort(SynthesisParams().effort);
+  }
   if (const absl::StatusOr<Recipe> recipe = ParseRecipe(request.recipe_json()); recipe.ok()) {
     request.set_recipe_json(recipe->json.dump());
   }
@@ -55,6 +58,9 @@ absl::Status CheckSynthesizeRequest(const v1::SynthesizeTileSetRequest& request,
     return refuse(absl::StrCat("tile_size ", tile_size, ", expected twice the strip height (",
                                2 * uint64_t{strip_height}, ") to ", kMaxTileSize),
                   "tile_size");
+  }
+  if (filled.effort() > kMostEffort) {
+    return refuse(absl::StrCat("effort ", filled.effort(), ", expected 1 to ", kMostEffort), "effort");
   }
   if (*method != SynthesisMethod::kFrame && tile_size % 2 != 0) {
     return refuse(absl::StrCat("tile_size ", tile_size, ", expected an even number for method \"",
@@ -94,6 +100,7 @@ absl::StatusOr<JobOutput> RunSynthesizeJob(const JobInput& input, const JobConte
   params.strip_height = static_cast<int>(request.strip_height());
   params.seed = request.seed();
   params.force = request.force();
+  params.effort = static_cast<int>(request.effort());
   TESSERA_ASSIGN_OR_RETURN(params.method, ParseSynthesisMethod(request.method()));
   if (!request.recipe_json().empty()) {
     TESSERA_ASSIGN_OR_RETURN(params.recipe, ParseRecipe(request.recipe_json()));

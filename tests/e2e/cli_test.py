@@ -263,6 +263,11 @@ class MainJobTest(harness.CommandTest):
         self.assertEqual(self.run_json("tileset", "show", "surface-96/skin")["certificate"], whole)
         self.assert_fails(5, "tileset", "synthesize", "skin", *SYNTHESIZE, "--force", reason="NAME_TAKEN")
         self.assertEqual(self.run_json("tileset", "show", "surface-96/skin")["metadata"]["method"], "frame")
+        self.assertEqual(self.tessera("tileset", "synthesize", "skin", *SYNTHESIZE, "--effort", 101).code, 2)
+        made = self.run_json("tileset", "synthesize", "skin", *SYNTHESIZE, "--force", "--name", "longer",
+                             "--effort", 2)
+        self.assertEqual(made["tile_set"]["metadata"]["parameters"]["effort"], 2)
+        self.run_ok("tileset", "delete", "surface-96/longer")
         made = self.run_json("tileset", "synthesize", "skin", *SYNTHESIZE, "--force", "--name", "diamonds",
                              "--method", "diamond-cut")
         self.assertEqual(made["tile_set"]["metadata"]["method"], "diamond-cut")

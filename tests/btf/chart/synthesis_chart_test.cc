@@ -93,7 +93,7 @@ TEST(SynthesisChartTest, CsvHasOneRowAPoint) {
   EXPECT_EQ(line,
             "\"hand, <made>\",64,64,32,diamond-dp,mismatch,32,256,8,1,1.5,0,1.25,1.5,0,0.1,0.3,0.4,2,0");
   std::getline(csv, line);
-  EXPECT_EQ(line, "\"hand, <made>\",64,64,32,frame,excess,32,8,8,1,1.5,0,1.25,1.5,0,0.1,0.3,0.4,2,0");
+  EXPECT_EQ(line, "\"hand, <made>\",64,64,32,frame,excess,32,16,8,1,1.5,0,1.25,1.5,0,0.1,0.3,0.4,2,0");
   EXPECT_FALSE(std::getline(csv, line));
 }
 

@@ -254,6 +254,34 @@ TEST(IndexMapsTest, RefusesSizesNamingTheLimit) {
   EXPECT_TRUE(CheckSizes(80, 80, params).ok());
 }
 
+TEST(IndexMapsTest, EffortImprovesWhereSeamsShow) {
+  // A slope that nowhere comes back: what has gone up must jump down.
+  Embedding embedding{
+      .width = 40, .height = 40, .dims = 1, .values = {}, .variance = {1.0}, .total_variance = 1.0};
+  for (int i = 0; i < 4 * 40 * 40; ++i) {
+    const float x = static_cast<float>(i % 40);
+    const float y = static_cast<float>(i / 40 % 40);
+    embedding.values.push_back(x + 0.1F * x * y);
+  }
+  const Exemplar exemplar(embedding);
+  SynthesisParams params = SmallParams();
+  params.tile_size = 48;
+  const auto seams = [&](int effort) {
+    params.effort = effort;
+    const IndexMaps maps = Synthesize(exemplar, "plane-16", params, 0);
+    double sum = 0.0;
+    for (const FillReport& report : maps.tile_reports) {
+      sum += report.mean_mismatch / 16;
+    }
+    return sum;
+  };
+  EXPECT_LT(seams(8), 0.95 * seams(1));
+  for (const int effort : {0, kMostEffort + 1}) {
+    params.effort = effort;
+    EXPECT_THAT(CheckSizes(40, 40, params).message(), HasSubstr("must be in [1, 100]"));
+  }
+}
+
 TEST(IndexMapsTest, SaysWhichStripMissedItsThresholdAndByHowMuch) {
   const Exemplar exemplar(BumpyEmbedding(32, 32, 6));
   SynthesisParams params = SmallParams();

@@ -209,6 +209,22 @@ TEST(GridCutTest, MatchesAugmentingPathsOnLargerGrids) {
   }
 }
 
+TEST(GridCutTest, MayEndEarlyOnlyWhereEveryCutCostsEnough) {
+  Rng rng(5);
+  GridCut cut;
+  for (int round = 0; round < 60; ++round) {
+    Grid grid = RandomGrid(rng, 12, 9, 1000);
+    const int64_t value = SlowMaxFlow(grid);
+    grid.Fill(cut);
+    ASSERT_EQ(cut.Solve(value + 1), value) << "round " << round;
+    ASSERT_EQ(CutValueOfLabels(grid, cut), value) << "round " << round;
+    grid.Fill(cut);
+    const int64_t early = cut.Solve(value / 2);
+    ASSERT_GE(early, value / 2) << "round " << round;
+    ASSERT_LE(early, value) << "round " << round;
+  }
+}
+
 TEST(GridCutTest, PinnedSidesAreCutBetween) {
   const int n = 64;
   Rng rng(3);

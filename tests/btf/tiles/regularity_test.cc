@@ -84,7 +84,7 @@ TEST(RegularityTest, TilesInStepKeepThePeriodAndOthersDoNot) {
     SynthesisParams params;
     params.tile_size = tile_size;
     params.strip_height = 8;
-    params.num_candidates = 4;
+    params.num_candidates = 8;
     params.force = true;
     const auto maps = SynthesizeIndexMaps(quilt, plane, params, RunContext{});
     EXPECT_TRUE(maps.ok()) << maps.status();

@@ -61,15 +61,15 @@ TEST(PairCostTest, ExcessIsWhatASeamStepsBeyondItsPatchesAndSomeOfWhatTheyWouldH
   const double unit = kCostPerStep / excess.mean_step();
   // Texels 1 and 8: both patches are flat, the step of 1 shows.
   EXPECT_NEAR(PairCost(mismatch, 1, 8, GridCut::kRight), 2.0 * unit, 1.0);
-  EXPECT_NEAR(PairCost(excess, 1, 8, GridCut::kRight), (2.0 + 0.3 * 2.0) * unit, 1.0);
+  EXPECT_NEAR(PairCost(excess, 1, 8, GridCut::kRight), (2.0 + 0.15 * 2.0) * unit, 1.0);
   // Texels 2 and 9: both patches step by 9, the seam by 10.
   EXPECT_NEAR(PairCost(mismatch, 2, 9, GridCut::kRight), 2.0 * unit, 1.0);
-  EXPECT_NEAR(PairCost(excess, 2, 9, GridCut::kRight), (2.0 + 0.3 * (std::sqrt(328.0) - 18.0)) * unit, 1.0);
+  EXPECT_NEAR(PairCost(excess, 2, 9, GridCut::kRight), (2.0 + 0.15 * (std::sqrt(328.0) - 18.0)) * unit, 1.0);
   // Texels 5 and 10: their patches step by 8 and 0, the seam by 1 only.
   EXPECT_NEAR(PairCost(excess, 5, 10, GridCut::kRight),
-              0.3 * (std::sqrt(8.0 * 8.0 + 10.0 * 10.0) - 8.0) * unit, 1.0);
+              0.15 * (std::sqrt(8.0 * 8.0 + 10.0 * 10.0) - 8.0) * unit, 1.0);
   // Texels 2 and 1: nothing steps here, but the edge beyond texel 2 is lost.
-  EXPECT_NEAR(PairCost(excess, 2, 1, GridCut::kRight), 0.3 * (std::sqrt(162.0) - 9.0) * unit, 1.0);
+  EXPECT_NEAR(PairCost(excess, 2, 1, GridCut::kRight), 0.15 * (std::sqrt(162.0) - 9.0) * unit, 1.0);
 }
 
 // A canvas full of old seams, some texels fixed, some empty; every choice of old and new tried. Under
@@ -125,6 +125,13 @@ TEST_P(SeamRuleTest, ACutFindsTheCheapestChoiceWithOldSeams) {
       EXPECT_EQ(CostOf(after), best) << "round " << round;
     }
     EXPECT_GE(cut.cost_change, CostOf(after) - CostOf(canvas)) << "round " << round;
+    const PatchCut below = cutter.Cut(canvas, window, patch, cut.cost_change + 1);
+    EXPECT_EQ(below.cost_change, cut.cost_change) << "round " << round;
+    EXPECT_EQ(below.takes_new, cut.takes_new) << "round " << round;
+    const PatchCut none = cutter.Cut(canvas, window, patch, cut.cost_change);
+    EXPECT_GE(none.cost_change, cut.cost_change) << "round " << round;
+    EXPECT_EQ(none.num_new, 0) << "round " << round;
+    EXPECT_EQ(std::ranges::count(none.takes_new, 1), 0) << "round " << round;
     for (int y = 0; y < 5; ++y) {
       for (int x = 0; x < 6; ++x) {
         if (canvas.fixed(x, y)) {

@@ -73,6 +73,26 @@ TEST(SiblingsTest, SeesASiblingLaidTurned) {
   EXPECT_FALSE(repeats({0, 2, 3}));
 }
 
+TEST(SiblingsTest, RepeatsAWholeTileByItsInside) {
+  const Exemplar exemplar(BumpyEmbedding(32, 32, 5));
+  const std::vector<uint32_t> texels = Tiles(exemplar);
+  const Siblings siblings(texels, kSize, kMargin, 0, {0});
+  const auto second = std::span(texels).subspan(kSize * kSize, kSize * kSize);
+  std::vector<uint32_t> tile(kSize * kSize, 0);
+  // 12 x 12 texels of inside: 21 are below 15%, 22 above.
+  const auto show = [&](int count) {
+    for (int i = 0; i < count; ++i) {
+      const int at = (kMargin + i / 12) * kSize + kMargin + i % 12;
+      tile[at] = second[at];
+    }
+  };
+  std::copy_n(second.begin(), kMargin * kSize, tile.begin());
+  show(21);
+  EXPECT_FALSE(siblings.Repeats(tile));
+  show(22);
+  EXPECT_TRUE(siblings.Repeats(tile));
+}
+
 TEST(SiblingsTest, LooksAtTheInsideOnly) {
   const Exemplar exemplar(BumpyEmbedding(32, 32, 3));
   const std::vector<uint32_t> texels = Tiles(exemplar);

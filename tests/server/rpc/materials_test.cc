@@ -117,6 +117,9 @@ TEST_F(ServerTest, WrongArgumentsAreRefusedBeforeAnyJob) {
   synthesis.set_tile_size(64);
   EXPECT_EQ(synthesize(), "ARGUMENT_INVALID");
   synthesis.set_strip_height(0);
+  synthesis.set_effort(101);
+  EXPECT_EQ(synthesize(), "ARGUMENT_INVALID");
+  synthesis.set_effort(0);
   for (const char* const method : {"frame", "diamond-dp", "diamond-cut"}) {
     synthesis.set_method(method);
     EXPECT_EQ(synthesize(), "NOT_FOUND") << method;
