@@ -43,7 +43,7 @@ class UsageMap {
 
 class FourierTransform;
 
-// Side of the regions for windows of up to three features, in texels.
+// Side of the regions for windows of up to two and a half features, in texels.
 [[nodiscard]] int RegionSide(const Exemplar& exemplar, int feature_size);
 
 // Transforms of the exemplar in its turns, by regions; shared by all threads.

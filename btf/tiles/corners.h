@@ -28,7 +28,7 @@ namespace tessera {
 struct CornerCut {
   CornerPair pair;
   std::vector<uint8_t> in_wins;  // [j][i], h/2 x h/2
-  // In the units of PairCost: of the cut, and eight times that of the vertex texel against the one across
+  // In the units of PairCost: of the cut, and twice that of the vertex texel against the one across
   // side `in`.
   int64_t cost = 0;
 };

@@ -7,7 +7,6 @@
 #include <optional>
 #include <utility>
 
-#include "btf/base/parallel.h"
 #include "btf/base/rng.h"
 #include "btf/base/status_macros.h"
 

@@ -116,6 +116,7 @@ struct PatchCut {
   int num_truncated = 0;  // pairs whose table was not submodular
 };
 
+// More than any canvas costs.
 inline constexpr int64_t kAnyChange = int64_t{1} << 60;
 
 // Cuts patches into a canvas. Keeps scratch memory: one per thread.

@@ -77,8 +77,8 @@ struct SynthesisParams {
 // MATERIAL_TOO_SMALL when the exemplar is the cause), an unknown codec, or the recipe's key (features.h);
 // UNIMPLEMENTED when colours of a codec cannot be moved (codec/recolour.h); FAILED_PRECONDITION with reason
 // NOT_ISOTROPIC (turned strips only, unless forced) or THRESHOLD_NOT_REACHED (unless forced), each with its
-// figures; CANCELLED within one patch search. Progress: stages "corners", "strips", "tiles" and
-// "certificate"; of diamonds, whose thresholds are told but not enforced, "samples", "tiles" and
+// figures; CANCELLED within one patch search. Progress: stages "corners", "strips", "laying",
+// "tiles" and "certificate"; of diamonds, whose thresholds are told but not enforced, "samples", "tiles" and
 // "certificate".
 [[nodiscard]] absl::StatusOr<TileSet> SynthesizeTileSet(const Material& material,
                                                         const Arrangement& arrangement,
