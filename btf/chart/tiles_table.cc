@@ -20,8 +20,8 @@ namespace {
 constexpr char kTilesArrangement[] = "surface-96";
 constexpr int kLargestUnaskedSide = 128;  // of PaperSize::kWithoutLargest
 
-// [Leung2007] Tables I and III. Where a material has fewer directions than the paper's, synthesis takes as
-// long: it sees coefficients.
+// [Leung2007] Tables I and III. FLOORTILE has fewer directions than the paper's, so that its images are small
+// enough to make; synthesis takes as long, for it sees coefficients.
 std::vector<TilesRow> PaperTilesRows() {
   return {{.material = "FLOORTILE",
            .source = "generated:holes,size=800,views=5x8,lights=5x8",
@@ -33,7 +33,7 @@ std::vector<TilesRow> PaperTilesRows() {
            .paper_megabytes = 186.10,
            .run = {}},
           {.material = "IMPALLA",
-           .source = "generated:wrinkles,size=256,views=5x8,lights=5x8",
+           .source = "generated:wrinkles,size=256",
            .side = 256,
            .tile_size = 256,
            .k = 25,
@@ -42,7 +42,7 @@ std::vector<TilesRow> PaperTilesRows() {
            .paper_megabytes = 61.36,
            .run = {}},
           {.material = "WRINKLES",
-           .source = "generated:wrinkles,views=5x8,lights=5x8",
+           .source = "generated:wrinkles",
            .side = 128,
            .tile_size = 64,
            .k = 25,
@@ -51,7 +51,7 @@ std::vector<TilesRow> PaperTilesRows() {
            .paper_megabytes = 23.64,
            .run = {}},
           {.material = "HOLES",
-           .source = "generated:holes,views=5x8,lights=5x8",
+           .source = "generated:holes",
            .side = 128,
            .tile_size = 100,
            .k = 25,
@@ -60,7 +60,7 @@ std::vector<TilesRow> PaperTilesRows() {
            .paper_megabytes = 10.72,
            .run = {}},
           {.material = "REACTDIFFUSE",
-           .source = "generated:reactdiffuse,views=5x8,lights=5x8",
+           .source = "generated:reactdiffuse",
            .side = 128,
            .tile_size = 64,
            .k = 25,
