@@ -36,12 +36,13 @@ constexpr double kFixedWeight = 2.0;   // of texels that will stay, against free
 constexpr double kFailureDoubt = 0.3;  // how fast a texel is drawn less with windows that changed nothing
 constexpr double kSeamDoubt = 2.0;     // how fast a texel's weight falls with its mismatch in mean steps
 constexpr int kMostHalfFeatures = 4;   // sides of windows that improve: one to four halves of a feature
-// Windows tried for each h x h of free texels, a quarter of them even on a canvas that is good before: its
-// few bad seams are seen all the same; at least and, while thresholds are missed, at most.
+// Windows tried for each h x h of free texels; at least; and, while thresholds are missed, at most.
 constexpr int kWindowsPerFeature = 4;
 constexpr int kFewestWindows = 24;
-constexpr int kPatience = 4;            // times as many while a threshold is missed
-constexpr double kGoodRatio = 1.0;      // FillReport::step_ratio of a canvas that is good
+constexpr int kPatience = 4;        // times as many while a threshold is missed
+constexpr double kGoodRatio = 1.0;  // FillReport::step_ratio of a canvas that is good
+// The share of windows tried even on a good canvas: its few bad seams are seen all the same.
+constexpr double kGoodShare = 0.2;
 constexpr int kWindowsPerMeasure = 16;  // a canvas is measured once for so many
 
 enum FillSeed : uint64_t { kLaySeed = 1, kImproveSeed = 2 };
@@ -356,7 +357,7 @@ absl::Status Filler::Improve(const FillParams& params, const RunContext& context
     if (round % kWindowsPerMeasure == 0) {
       const FillReport measured = MeasureCanvas(canvas, params);
       if (measured.reached &&
-          (round >= budget || (4 * round >= budget && measured.step_ratio <= kGoodRatio))) {
+          (round >= budget || (round >= kGoodShare * budget && measured.step_ratio <= kGoodRatio))) {
         break;
       }
     }

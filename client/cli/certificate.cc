@@ -1,6 +1,7 @@
 #include "client/cli/certificate.h"
 
 #include <array>
+#include <optional>
 
 #include <fmt/format.h>
 
@@ -11,12 +12,18 @@ namespace {
 
 constexpr std::array<const char*, 2> kParts = {"borders", "insides"};
 
-// The figure at a path of keys as text, empty where there is no such number.
-std::string Figure(const Json& certificate, const char* pointer, const char* format = "{:.3f}") {
+// The number at a path of keys, if there is one.
+std::optional<double> Number(const Json& certificate, const std::string& pointer) {
   const Json::json_pointer at(pointer);
   return certificate.contains(at) && certificate.at(at).is_number()
-             ? fmt::format(fmt::runtime(format), certificate.at(at).get<double>())
-             : std::string();
+             ? std::optional(certificate.at(at).get<double>())
+             : std::nullopt;
+}
+
+// The same as text, empty where there is none.
+std::string Figure(const Json& certificate, const std::string& pointer, const char* format = "{:.3f}") {
+  const std::optional<double> number = Number(certificate, pointer);
+  return number ? fmt::format(fmt::runtime(format), *number) : std::string();
 }
 
 }  // namespace
@@ -25,14 +32,11 @@ std::string CertificateText(const Json& certificate) {
   std::vector<std::vector<std::string>> table = {{"SEAMS", "RATIO", "P95", "WORST", "RUNS P95", "CUT %"}};
   for (const std::string part : kParts) {
     const auto figure = [&](const char* key) {
-      return Figure(certificate, fmt::format("/{}/{}", part, key).c_str());
+      return Figure(certificate, fmt::format("/{}/{}", part, key));
     };
-    const Json::json_pointer cut("/" + part + "/cut_share");
+    const std::optional<double> cut = Number(certificate, "/" + part + "/cut_share");
     table.push_back({part, figure("ratio"), figure("ratio_p95"), figure("ratio_worst"),
-                     figure("ratio_run_p95"),
-                     certificate.contains(cut) && certificate.at(cut).is_number()
-                         ? fmt::format("{:.1f}", 100.0 * certificate.at(cut).get<double>())
-                         : std::string()});
+                     figure("ratio_run_p95"), cut ? fmt::format("{:.1f}", 100.0 * *cut) : std::string()});
   }
   table.push_back({"random minimum cuts", Figure(certificate, "/controls/random_minimum_cuts")});
   table.push_back({"random straight cuts", Figure(certificate, "/controls/random_straight_cuts")});
@@ -63,24 +67,24 @@ std::string CertificateText(const Json& certificate) {
 std::vector<std::string> CertificateWarnings(const Json& certificate) {
   std::vector<std::string> warnings;
   for (const char* const part : kParts) {
-    const Json::json_pointer at(fmt::format("/{}/ratio", part));
-    if (!certificate.contains(at) || !certificate.at(at).is_number()) {
-      continue;
-    }
-    const auto ratio = certificate.at(at).get<double>();
-    if (ratio > kSeamRatioLimit) {
+    if (const auto ratio = Number(certificate, fmt::format("/{}/ratio", part));
+        ratio && *ratio > kSeamRatioLimit) {
       warnings.push_back(
           fmt::format("seams of the {} read {:.2f}, above the limit of {:.2f}: look at `tileset sheet "
                       "--heat`, raise --effort",
-                      part, ratio, kSeamRatioLimit));
+                      part, *ratio, kSeamRatioLimit));
     }
   }
-  const Json::json_pointer kept("/repetition/period/kept");
-  if (certificate.contains(kept) && certificate.at(kept).is_number() &&
-      certificate.at(kept).get<double>() < kPeriodKeptLimit) {
+  if (const auto kept = Number(certificate, "/repetition/period/kept"); kept && *kept < kPeriodKeptLimit) {
     warnings.push_back(fmt::format(
         "the material's period is lost: a plane of tiles keeps {:.2f} of it, below the limit of {:.2f}",
-        certificate.at(kept).get<double>(), kPeriodKeptLimit));
+        *kept, kPeriodKeptLimit));
+  }
+  if (const auto ratio = Number(certificate, "/repetition/ratio"); ratio && *ratio > kRepetitionLimit) {
+    warnings.push_back(fmt::format(
+        "a plane of tiles repeats {:.2f} times as much as the material, above the limit of {:.2f}: "
+        "larger tiles repeat less, and so does surface-26",
+        *ratio, kRepetitionLimit));
   }
   return warnings;
 }

@@ -16,12 +16,16 @@ inline constexpr double kSeamRatioLimit = 1.5;
 // step: generated weave keeps 0.98 where tiles are in step and 0.38 where they are half a period off.
 inline constexpr double kPeriodKeptLimit = 0.8;
 
+// Planes of tiles that repeat by more than this times the material's own autocorrelation repeat more than
+// need be: turned strips in tiles of 96 texels keep every measured isotropic material below it.
+inline constexpr double kRepetitionLimit = 1.2;
+
 // A table of seams beside what random cuts score, and lines on repetition and use of the material. Figures
 // that are missing are left out.
 [[nodiscard]] std::string CertificateText(const Json& certificate);
 
-// One sentence per part of the certificate (borders, insides) whose pooled ratio is above the limit, and one
-// where the period is not kept.
+// One sentence per part of the certificate (borders, insides) whose pooled ratio is above the limit, one
+// where the period is not kept, and one where the plane of tiles repeats.
 [[nodiscard]] std::vector<std::string> CertificateWarnings(const Json& certificate);
 
 }  // namespace tessera::cli

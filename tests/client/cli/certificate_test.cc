@@ -37,6 +37,16 @@ TEST(CertificateTest, TellsWhetherARegularMaterialKeepsItsPeriod) {
   EXPECT_NE(warnings[0].find("keeps 0.50 of it, below the limit of 0.80"), std::string::npos) << warnings[0];
 }
 
+TEST(CertificateTest, WarnsOfAPlaneThatRepeats) {
+  const auto with = [](double ratio) { return Json{{"repetition", {{"ratio", ratio}}}}; };
+  EXPECT_TRUE(CertificateWarnings(with(1.2)).empty());
+  const std::vector<std::string> warnings = CertificateWarnings(with(1.21));
+  ASSERT_EQ(warnings.size(), 1u);
+  EXPECT_NE(warnings[0].find("repeats 1.21 times as much as the material, above the limit of 1.20"),
+            std::string::npos)
+      << warnings[0];
+}
+
 TEST(CertificateTest, SaysNothingOfACertificateWithoutFigures) {
   EXPECT_TRUE(CertificateWarnings(Json::object()).empty());
   EXPECT_TRUE(CertificateWarnings(Json("none")).empty());
