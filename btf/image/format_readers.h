@@ -16,5 +16,8 @@ namespace tessera {
 [[nodiscard]] absl::StatusOr<std::unique_ptr<ImageReader>> OpenJpeg(std::unique_ptr<ByteStream> stream,
                                                                     std::string name,
                                                                     const ImageReadOptions& options);
+[[nodiscard]] absl::StatusOr<std::unique_ptr<ImageReader>> OpenRadiance(std::unique_ptr<ByteStream> stream,
+                                                                        std::string name,
+                                                                        const ImageReadOptions& options);
 
 }  // namespace tessera

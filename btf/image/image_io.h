@@ -1,4 +1,4 @@
-// Whole images from and to files and bytes: PNG, JPEG, OpenEXR.
+// Whole images from and to files and bytes: PNG, JPEG, OpenEXR, and from Radiance's (.hdr, .pic).
 //
 //   TESSERA_ASSIGN_OR_RETURN(Image height, ReadImage("height.png", Transfer::Linear()));
 //   TESSERA_ASSIGN_OR_RETURN(std::string png, EncodePng(picture));
@@ -6,8 +6,10 @@
 //
 // Formats are told apart by their first bytes, never by name. What is read: PNG gray, RGB, palette, with or
 // without alpha, up to 16 bits; JPEG gray and YCbCr/RGB, 8 bits; EXR scanline or tiled, half, float or uint,
-// channels R G B, or Y, and A. Not read, by name: CMYK JPEG, deep or luminance-chroma EXR. Colour profiles in
-// files are ignored: the transfer curve is an argument. At most kMaxImageSide on a side.
+// channels R G B, or Y, and A; Radiance RGBE, plain or run-length encoded either way, top row first, as
+// mantissa times 2^(exponent - 136) over the file's EXPOSURE and COLORCORR. Not read, by name: CMYK JPEG,
+// deep or luminance-chroma EXR, Radiance XYZE or turned. Colour profiles in files are ignored: the transfer
+// curve is an argument. At most kMaxImageSide on a side.
 #pragma once
 
 #include <cstddef>
@@ -28,7 +30,8 @@ namespace tessera {
 inline constexpr int kMaxImageSide = 16384;
 
 // Linear image with the file's number of channels (1, 3, or 4 with alpha, which no transfer curve touches;
-// gray with alpha becomes 4). Without a transfer curve: srgb for PNG and JPEG, linear for EXR.
+// gray with alpha becomes 4). Without a transfer curve: srgb for PNG and JPEG, linear for EXR and
+// Radiance.
 // Errors: NOT_FOUND, PERMISSION_DENIED, INVALID_ARGUMENT (not such an image, size beyond the limit, kinds not
 // read), DATA_LOSS (truncated or damaged), RESOURCE_EXHAUSTED (memory). Every message begins with the name.
 [[nodiscard]] absl::StatusOr<Image> ReadImage(const std::filesystem::path& path,

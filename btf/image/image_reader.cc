@@ -57,6 +57,7 @@ bool StartsWith(std::span<const std::byte> bytes, const std::array<uint8_t, kSiz
 constexpr std::array<uint8_t, 8> kPngMagic = {0x89, 'P', 'N', 'G', '\r', '\n', 0x1a, '\n'};
 constexpr std::array<uint8_t, 3> kJpegMagic = {0xff, 0xd8, 0xff};
 constexpr std::array<uint8_t, 4> kExrMagic = {0x76, 0x2f, 0x31, 0x01};
+constexpr std::array<uint8_t, 2> kRadianceMagic = {'#', '?'};
 
 }  // namespace
 
@@ -106,8 +107,11 @@ absl::StatusOr<std::unique_ptr<ImageReader>> OpenImage(std::unique_ptr<ByteStrea
                              ExrFile::Open(std::move(stream), std::move(owned_name), options));
     return file->OpenPart(0);
   }
+  if (StartsWith(head, kRadianceMagic)) {
+    return OpenRadiance(std::move(stream), std::move(owned_name), options);
+  }
   return absl::InvalidArgumentError(
-      absl::StrCat(owned_name, ": ", count == 0 ? "empty" : "not a PNG, JPEG or OpenEXR image"));
+      absl::StrCat(owned_name, ": ", count == 0 ? "empty" : "not a PNG, JPEG, OpenEXR or Radiance image"));
 }
 
 }  // namespace tessera

@@ -23,13 +23,13 @@
 
 namespace tessera {
 
-enum class ImageFormat { kPng, kJpeg, kExr };
+enum class ImageFormat { kPng, kJpeg, kExr, kRadiance };
 
 // The transfer curve that files of the format have unless they are known to differ: srgb for PNG and JPEG,
-// linear for EXR.
+// linear for EXR and Radiance.
 constexpr Transfer DefaultTransfer(ImageFormat format) {
-  return format == ImageFormat::kExr ? Transfer{TransferKind::kLinear, 1.0}
-                                     : Transfer{TransferKind::kSrgb, 2.2};
+  const bool is_linear = format == ImageFormat::kExr || format == ImageFormat::kRadiance;
+  return is_linear ? Transfer{TransferKind::kLinear, 1.0} : Transfer{TransferKind::kSrgb, 2.2};
 }
 
 enum class SampleType : uint8_t { kU8, kU16, kHalf, kFloat };

@@ -1,5 +1,6 @@
 #include "tests/support/image_files.h"
 
+#include <array>
 #include <cstddef>
 #include <cstdio>
 #include <cstdlib>
@@ -106,6 +107,79 @@ std::string MakeJpeg(const CodeImage& image, JpegLayout layout) {
   std::string bytes(reinterpret_cast<char*>(data), size);
   jpeg_destroy_compress(&state);
   std::free(data);
+  return bytes;
+}
+
+namespace {
+
+using RgbePixel = std::array<char, 4>;
+
+void AppendPixelRuns(const std::vector<RgbePixel>& row, std::string& bytes) {
+  for (size_t x = 0; x < row.size();) {
+    size_t end = x + 1;
+    while (end < row.size() && row[end] == row[x]) {
+      ++end;
+    }
+    bytes.append(row[x].data(), 4);
+    for (size_t repeats = end - x - 1; repeats > 0; repeats >>= 8) {
+      bytes.append({1, 1, 1, static_cast<char>(repeats & 255)});
+    }
+    x = end;
+  }
+}
+
+void AppendComponentRuns(const std::vector<RgbePixel>& row, std::string& bytes) {
+  bytes.append({2, 2, static_cast<char>(row.size() >> 8), static_cast<char>(row.size() & 255)});
+  for (size_t component = 0; component < 4; ++component) {
+    const auto run_at = [&](size_t x) {
+      size_t end = x + 1;
+      while (end < row.size() && end - x < 127 && row[end][component] == row[x][component]) {
+        ++end;
+      }
+      return end - x;
+    };
+    for (size_t x = 0; x < row.size();) {
+      if (const size_t run = run_at(x); run > 2) {
+        bytes.append({static_cast<char>(128 + run), row[x][component]});
+        x += run;
+        continue;
+      }
+      size_t end = x;
+      while (end < row.size() && end - x < 128 && run_at(end) <= 2) {
+        ++end;
+      }
+      bytes.push_back(static_cast<char>(end - x));
+      for (; x < end; ++x) {
+        bytes.push_back(row[x][component]);
+      }
+    }
+  }
+}
+
+}  // namespace
+
+std::string MakeRadiance(const CodeImage& image, RadianceLayout layout, const std::string& variables) {
+  std::string bytes = "#?RADIANCE\n" + variables + "\n-Y " + std::to_string(image.height) + " +X " +
+                      std::to_string(image.width) + "\n";
+  for (int y = 0; y < image.height; ++y) {
+    std::vector<RgbePixel> row(image.width);
+    for (size_t i = 0; i < row.size() * 4; ++i) {
+      row[i / 4][i % 4] = static_cast<char>(image.codes[y * row.size() * 4 + i]);
+    }
+    switch (layout) {
+      case RadianceLayout::kPlain:
+        for (const RgbePixel& pixel : row) {
+          bytes.append(pixel.data(), 4);
+        }
+        break;
+      case RadianceLayout::kPixelRuns:
+        AppendPixelRuns(row, bytes);
+        break;
+      case RadianceLayout::kComponentRuns:
+        AppendComponentRuns(row, bytes);
+        break;
+    }
+  }
   return bytes;
 }
 

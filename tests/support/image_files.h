@@ -37,4 +37,10 @@ enum class JpegLayout { kBaseline, kProgressive };
 // Quality 100, no chroma subsampling. channels: 1, 3 or 4 (4 is written as CMYK).
 [[nodiscard]] std::string MakeJpeg(const CodeImage& image, JpegLayout layout = JpegLayout::kBaseline);
 
+enum class RadianceLayout { kPlain, kPixelRuns, kComponentRuns };
+// A Radiance picture whose pixels are the image's four channels, red, green, blue and exponent. `variables`
+// are lines for its header, each ended by a newline.
+[[nodiscard]] std::string MakeRadiance(const CodeImage& image, RadianceLayout layout,
+                                       const std::string& variables = "FORMAT=32-bit_rle_rgbe\n");
+
 }  // namespace tessera

@@ -39,6 +39,19 @@ CodeImage Gradient(int width, int height, int channels) {
   return image;
 }
 
+// Red, green, blue and exponent, with runs of several lengths; never a pixel that means a run.
+CodeImage RgbePattern(int width, int height) {
+  CodeImage image(width, height, 4);
+  for (int i = 0; i < width * height; ++i) {
+    const int run = i / 7 % 3 == 0 ? i : i / 7;
+    for (int channel = 0; channel < 4; ++channel) {
+      const unsigned code = (run * 4 + channel) * 2654435761u >> 9;
+      image.codes[4 * i + channel] = static_cast<uint16_t>(channel == 3 ? 120 + code % 20 : 3 + code % 253);
+    }
+  }
+  return image;
+}
+
 absl::StatusOr<std::unique_ptr<ImageReader>> Open(const std::string& bytes, AlphaUse alpha = AlphaUse::kKeep,
                                                   uint64_t limit = uint64_t{1} << 30) {
   return OpenImage(MakeMemoryStream(bytes), "picture", {.alpha = alpha, .memory_limit_bytes = limit});
@@ -195,7 +208,10 @@ std::vector<std::string> SomeFiles() {
           MakeJpeg(Gradient(24, 18, 3)),
           MakeJpeg(Gradient(24, 18, 3), JpegLayout::kProgressive),
           *EncodeExr(linear),
-          *EncodeExr(linear, ExrDepth::kFloat)};
+          *EncodeExr(linear, ExrDepth::kFloat),
+          MakeRadiance(RgbePattern(24, 18), RadianceLayout::kPlain),
+          MakeRadiance(RgbePattern(24, 18), RadianceLayout::kPixelRuns),
+          MakeRadiance(RgbePattern(24, 18), RadianceLayout::kComponentRuns)};
 }
 
 TEST(ImageReaderTest, TruncationAtEveryLengthIsAnError) {
