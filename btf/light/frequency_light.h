@@ -12,10 +12,12 @@
 // (render/preview.h's rule for irradiance).
 //
 //   TESSERA_ASSIGN_OR_RETURN(const FrequencyLight light, FrequencyLight::Create(environment, /*n=*/25));
-//   const Eigen::MatrixXd in_frame = light.InFrame(local_from_world);                  // once a frame,
-//   [25][3] const LinearForm form = RadianceForm(*decoder, view, in_frame, /*turns=*/0);       // once a view
-//   and turn Eigen::Array3d radiance = form.ValueOf(coefficients).max(0.0);                     // once a
-//   BTFel
+//   // once a frame, [25][3]
+//   const Eigen::MatrixXd in_frame = light.InFrame(local_from_world);
+//   // once a view and turn
+//   const LinearForm form = RadianceForm(*decoder, view, in_frame, /*turns=*/0);
+//   // once a BTFel
+//   const Eigen::Array3d radiance = form.ValueOf(coefficients).max(0.0);
 //
 // Exact for the light that n harmonics hold; what they do not hold is lost. Values are summed before the
 // clamp at 0 that ends every decode, so dark BTFels may come out below. No light is shadowed by the mesh.

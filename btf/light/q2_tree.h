@@ -7,8 +7,8 @@
 // 3 and single ones, so that any number of lights can be had.
 //
 //   Q2Tree tree(environment);
-//   for (const EnvironmentLight& light : tree.Lights(200)) { .. }     // Light{kDirectional, direction,
-//   irradiance}
+//   TESSERA_ASSIGN_OR_RETURN(const std::vector<EnvironmentLight> lights, tree.Lights(200));
+//   // each is a directional Light of render/preview.h, with that irradiance
 //
 // Sources: [Wan2005] for the tree; [Gorski2005] for the quads and their numbers, about +y here. Which part is
 // cut next, and where a part's light comes from, is ours: the part with the largest power times spread, power
