@@ -16,29 +16,12 @@
 #include "btf/base/run_context.h"
 #include "btf/codec/codec.h"
 #include "btf/codec/material.h"
+#include "btf/codec/scene_light.h"
 #include "btf/data/btf_source.h"
 
 namespace tessera {
 
 inline constexpr char kAutoCodec[] = "auto";
-
-// What lights the scene that a model is for (design: "no more than a scene needs").
-enum class SceneLight {
-  kPoint,        // lamps and the sun: one look-up a lamp
-  kEnvironment,  // all of the sky: models that project on spherical harmonics take it as one sum
-};
-
-[[nodiscard]] constexpr std::string_view SceneLightName(SceneLight light) {
-  return light == SceneLight::kPoint ? "point" : "environment";
-}
-[[nodiscard]] constexpr std::optional<SceneLight> FindSceneLight(std::string_view name) {
-  for (const SceneLight light : {SceneLight::kPoint, SceneLight::kEnvironment}) {
-    if (SceneLightName(light) == name) {
-      return light;
-    }
-  }
-  return std::nullopt;
-}
 
 struct ModelRequest {
   std::string codec = "dsh-cls";  // an id of codec.h, or kAutoCodec

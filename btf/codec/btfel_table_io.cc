@@ -107,6 +107,39 @@ absl::Status CheckQuantisation(const BtfelTable& table) {
   return absl::OkStatus();
 }
 
+std::string EnergySectionName(size_t index) {
+  return absl::StrCat("btfels.", index);
+}
+
+// The coefficients in falling order of energy.
+std::vector<uint32_t> EnergyOrder(const BtfelTable& table) {
+  const size_t k = static_cast<size_t>(table.num_coefficients);
+  // Integer sums of codes and their squares: exact, so the order is the same on every machine.
+  std::vector<uint64_t> sum(k, 0);
+  std::vector<uint64_t> sum_of_squares(k, 0);
+  for (size_t n = 0; n < table.size(); ++n) {
+    const uint8_t* codes = table.codes.data() + n * k;
+    for (size_t i = 0; i < k; ++i) {
+      sum[i] += codes[i];
+      sum_of_squares[i] += static_cast<uint64_t>(codes[i]) * codes[i];
+    }
+  }
+  std::vector<double> energy(k);
+  for (size_t i = 0; i < k; ++i) {
+    const double offset = table.offset[i];
+    const double step = table.step[i];
+    energy[i] = static_cast<double>(table.size()) * offset * offset +
+                2.0 * offset * step * static_cast<double>(sum[i]) +
+                step * step * static_cast<double>(sum_of_squares[i]);
+  }
+  std::vector<uint32_t> order(k);
+  std::iota(order.begin(), order.end(), 0U);
+  std::ranges::stable_sort(order, [&](uint32_t a, uint32_t b) { return energy[a] > energy[b]; });
+  return order;
+}
+
+}  // namespace
+
 absl::Status AddDirections(std::string_view name, const std::vector<Direction>& directions,
                            Container& container) {
   std::vector<float> values;
@@ -143,39 +176,6 @@ absl::StatusOr<std::vector<Direction>> ReadDirections(std::string_view name, con
   }
   return directions;
 }
-
-std::string EnergySectionName(size_t index) {
-  return absl::StrCat("btfels.", index);
-}
-
-// The coefficients in falling order of energy.
-std::vector<uint32_t> EnergyOrder(const BtfelTable& table) {
-  const size_t k = static_cast<size_t>(table.num_coefficients);
-  // Integer sums of codes and their squares: exact, so the order is the same on every machine.
-  std::vector<uint64_t> sum(k, 0);
-  std::vector<uint64_t> sum_of_squares(k, 0);
-  for (size_t n = 0; n < table.size(); ++n) {
-    const uint8_t* codes = table.codes.data() + n * k;
-    for (size_t i = 0; i < k; ++i) {
-      sum[i] += codes[i];
-      sum_of_squares[i] += static_cast<uint64_t>(codes[i]) * codes[i];
-    }
-  }
-  std::vector<double> energy(k);
-  for (size_t i = 0; i < k; ++i) {
-    const double offset = table.offset[i];
-    const double step = table.step[i];
-    energy[i] = static_cast<double>(table.size()) * offset * offset +
-                2.0 * offset * step * static_cast<double>(sum[i]) +
-                step * step * static_cast<double>(sum_of_squares[i]);
-  }
-  std::vector<uint32_t> order(k);
-  std::iota(order.begin(), order.end(), 0U);
-  std::ranges::stable_sort(order, [&](uint32_t a, uint32_t b) { return energy[a] > energy[b]; });
-  return order;
-}
-
-}  // namespace
 
 absl::Status AddSharedTables(const BtfelTable& table, Container& container) {
   TESSERA_RETURN_IF_ERROR(CheckQuantisation(table));

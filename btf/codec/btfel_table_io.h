@@ -9,6 +9,7 @@
 #pragma once
 
 #include <cstdint>
+#include <string_view>
 #include <vector>
 
 #include <absl/status/status.h>
@@ -45,6 +46,13 @@ namespace tessera {
 // Sets table.codes, [n][k] in coefficient order. Errors: INVALID_ARGUMENT when the sections disagree in n,
 // their columns do not add up to k, or `btfel_order` is not a permutation.
 [[nodiscard]] absl::Status ReadCoefficientsByEnergy(const Container& container, BtfelTable& table);
+
+// A section f32 [n][3] of unit vectors. Errors: INVALID_ARGUMENT naming the first direction that is not
+// finite or points below the surface; also an empty section, ReadDirections.
+[[nodiscard]] absl::Status AddDirections(std::string_view name, const std::vector<Direction>& directions,
+                                         Container& container);
+[[nodiscard]] absl::StatusOr<std::vector<Direction>> ReadDirections(std::string_view name,
+                                                                    const Container& container);
 
 // Header keys `source`, `licence`, `citation`.
 void AddProvenance(const Provenance& provenance, Container& container);

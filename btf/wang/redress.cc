@@ -1,6 +1,10 @@
 #include "btf/wang/redress.h"
 
+#include <algorithm>
+
 #include <absl/strings/str_cat.h>
+
+#include "btf/wang/tile_set_parts.h"
 
 namespace tessera {
 
@@ -26,6 +30,7 @@ absl::StatusOr<Binding> Redress(const Dressing& dressing, const TileSet& tile_se
                                                    " texels for ", num_tiles, " tiles of ",
                                                    tile_set.tile_size, "x", tile_set.tile_size));
   }
+  const std::optional<std::vector<uint32_t>> held = TilesHeld(tile_set);
   Binding binding{
       .dressing = &dressing, .tile_set = &tile_set, .tile_size = tile_set.tile_size, .texels = {}};
   binding.texels.resize(num_quads);
@@ -35,6 +40,11 @@ absl::StatusOr<Binding> Redress(const Dressing& dressing, const TileSet& tile_se
       return absl::InvalidArgumentError(absl::StrCat("quad ", quad + 1, ": tile ", tile, " with ",
                                                      dressing.turns[quad], " turns; the tile set has ",
                                                      num_tiles, " tiles and turns are 0..3"));
+    }
+    if (held.has_value() && !std::ranges::binary_search(*held, tile)) {
+      return absl::FailedPreconditionError(
+          absl::StrCat("quad ", quad + 1, " shows tile ", tile, ", which is not among the ", held->size(),
+                       " of ", num_tiles, " tiles that this part of a tile set holds"));
     }
     binding.texels[quad] = tile_set.tile_index.data() + tile * texels_per_tile;
   }

@@ -23,7 +23,8 @@ struct Binding {
       texels;  // [quads], the quad's tile in tile_set->tile_index, [w][w], row 0 on top
 };
 
-// Errors: FAILED_PRECONDITION naming both arrangements and both SHA-256 when they differ, INVALID_ARGUMENT
+// Errors: FAILED_PRECONDITION naming both arrangements and both SHA-256 when they differ, or the
+// quad whose tile the tile set does not hold (tile_set_parts.h); INVALID_ARGUMENT
 // naming the quad when its tile or turn does not exist, or the shapes that disagree.
 [[nodiscard]] absl::StatusOr<Binding> Redress(const Dressing& dressing, const TileSet& tile_set);
 

@@ -70,6 +70,8 @@ absl::Status CheckTiles(const TileSet& tile_set) {
   return absl::OkStatus();
 }
 
+}  // namespace
+
 absl::Status CheckTileSet(const TileSet& tile_set) {
   TESSERA_RETURN_IF_ERROR(CheckArrangementName({tile_set.arrangement_id, tile_set.arrangement_sha256}));
   if (tile_set.tile_size < 1 || tile_set.tile_size > kMaxTileSize) {
@@ -83,8 +85,6 @@ absl::Status CheckTileSet(const TileSet& tile_set) {
   TESSERA_RETURN_IF_ERROR(CheckCodes(tile_set));
   return CheckTiles(tile_set);
 }
-
-}  // namespace
 
 absl::StatusOr<std::string> SerializeTileSet(const TileSet& tile_set) {
   TESSERA_RETURN_IF_ERROR(CheckTileSet(tile_set));

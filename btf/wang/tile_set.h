@@ -53,6 +53,9 @@ struct TileSet {
   }
 };
 
+// What both of the functions below check. Errors: those of theirs that are about more than bytes.
+[[nodiscard]] absl::Status CheckTileSet(const TileSet& tile_set);
+
 // Container of kind "tile_set" (codec/FORMAT.md). The digest must be that of the id and the codes listed, and
 // of the built-in arrangement of this id where there is one. Errors: INVALID_ARGUMENT naming the section,
 // value and limit, FAILED_PRECONDITION naming both digests; ParseTileSet, safe on hostile bytes, also those

@@ -1,0 +1,112 @@
+#include "btf/codec/coefficient_tables.h"
+
+#include <algorithm>
+#include <functional>
+#include <numeric>
+
+#include <absl/strings/str_cat.h>
+#include <absl/strings/str_join.h>
+
+namespace tessera {
+namespace {
+
+absl::Status Misshapen(const std::string& table, const std::vector<int64_t>& shape, int num_coefficients) {
+  return absl::InvalidArgumentError(absl::StrCat("codec table '", table, "': shape [",
+                                                 absl::StrJoin(shape, ", "), "] does not fit ",
+                                                 num_coefficients, " coefficients"));
+}
+
+int64_t SizeOfShape(const std::vector<int64_t>& shape) {
+  return std::accumulate(shape.begin(), shape.end(), int64_t{1}, std::multiplies());
+}
+
+}  // namespace
+
+absl::StatusOr<CoefficientTables> CoefficientTables::Create(std::string_view codec_id, int num_coefficients,
+                                                            const Shapes& shapes) {
+  CoefficientTables result;
+  // The last index of the table runs over coefficients first .. first + count - 1.
+  const auto add_columns = [&](const std::string& name, int64_t first, int64_t count) {
+    const auto found = shapes.find(name);
+    if (found == shapes.end()) {
+      return absl::OkStatus();
+    }
+    if (found->second.empty() || found->second.back() != count || count < 1) {
+      return Misshapen(name, found->second, num_coefficients);
+    }
+    Rule rule{SizeOfShape(found->second), SizeOfShape(found->second), count,
+              std::vector<int64_t>(num_coefficients, -1)};
+    std::iota(rule.column_of.begin() + first, rule.column_of.begin() + first + count, int64_t{0});
+    result.rules_[name] = std::move(rule);
+    return absl::OkStatus();
+  };
+  if (codec_id == "dfmf" && shapes.contains("luma")) {
+    const std::vector<int64_t>& luma = shapes.at("luma");
+    const int64_t rank = luma.empty() ? 0 : luma.back();
+    if (rank < 1 || rank > num_coefficients) {
+      return Misshapen("luma", luma, num_coefficients);
+    }
+    for (const char* suffix : {"", "_offset", "_step"}) {
+      if (absl::Status s = add_columns(absl::StrCat("luma", suffix), 0, rank); !s.ok()) {
+        return s;
+      }
+      if (absl::Status s = add_columns(absl::StrCat("chroma", suffix), rank, num_coefficients - rank);
+          !s.ok()) {
+        return s;
+      }
+    }
+  }
+  if (codec_id == "view-pca" && shapes.contains("light_weights")) {
+    const std::vector<int64_t>& shape = shapes.at("light_weights");
+    const bool fits = shape.size() == 3 && shape[0] > 0 && num_coefficients == shape[0] * 3 * (shape[2] + 1);
+    if (!fits) {
+      return Misshapen("light_weights", shape, num_coefficients);
+    }
+    const int64_t c = shape[2];
+    if (c > 0) {
+      Rule rule{SizeOfShape(shape), shape[1] * c, c, std::vector<int64_t>(num_coefficients, -1)};
+      for (int64_t i = 0; i < num_coefficients; ++i) {
+        const int64_t m = i % (c + 1);
+        if (m > 0) {
+          rule.column_of[i] = i / (3 * (c + 1)) * c + m - 1;
+        }
+      }
+      result.rules_["light_weights"] = std::move(rule);
+    }
+  }
+  return result;
+}
+
+bool CoefficientTables::NeedsEntries(uint32_t coefficient) const {
+  return std::ranges::any_of(rules_,
+                             [&](const auto& rule) { return rule.second.column_of[coefficient] >= 0; });
+}
+
+std::vector<int64_t> CoefficientTables::EntriesOf(const std::string& table,
+                                                  std::span<const uint32_t> coefficients,
+                                                  std::span<const uint32_t> before) const {
+  std::vector<int64_t> entries;
+  const auto found = rules_.find(table);
+  if (found == rules_.end() || found->second.size == 0) {
+    return entries;
+  }
+  const Rule& rule = found->second;
+  std::vector<bool> wanted(static_cast<size_t>(rule.size / rule.block * rule.width), false);
+  const auto set = [&](std::span<const uint32_t> of, bool value) {
+    for (const uint32_t coefficient : of) {
+      if (rule.column_of[coefficient] >= 0) {
+        wanted[static_cast<size_t>(rule.column_of[coefficient])] = value;
+      }
+    }
+  };
+  set(coefficients, true);
+  set(before, false);
+  for (int64_t entry = 0; entry < rule.size; ++entry) {
+    if (wanted[static_cast<size_t>(entry / rule.block * rule.width + entry % rule.width)]) {
+      entries.push_back(entry);
+    }
+  }
+  return entries;
+}
+
+}  // namespace tessera

@@ -1,0 +1,337 @@
+// The reading half of tile_set_parts.h.
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <functional>
+#include <limits>
+#include <numeric>
+
+#include <absl/strings/str_cat.h>
+
+#include "btf/base/sha256.h"
+#include "btf/base/status_macros.h"
+#include "btf/codec/btfel_table_io.h"
+#include "btf/codec/container.h"
+#include "btf/codec/decoder.h"
+#include "btf/wang/arrangement_header.h"
+#include "btf/wang/tile_set_parts.h"
+#include "btf/wang/tile_set_parts_layout.h"
+
+namespace tessera {
+namespace {
+
+constexpr char kPartKey[] = "part";
+constexpr int kMostTexelsOfSide = 4096;
+constexpr int kMostParts = 1 << 20;
+constexpr int64_t kMostCoefficients = int64_t{1} << 20;
+
+template <typename T>
+absl::StatusOr<std::vector<T>> ReadVector(const Container& container, std::string_view name) {
+  TESSERA_ASSIGN_OR_RETURN(const Section* section,
+                           RequireSection(container, name, DTypeOf<T>::value, std::array<int64_t, 1>{-1}));
+  return SectionValues<T>(*section);
+}
+
+bool AllFiniteValues(std::span<const float> values) {
+  return std::ranges::all_of(values, [](float value) { return std::isfinite(value); });
+}
+
+absl::StatusOr<std::vector<float>> ReadFinite(const Container& container, std::string_view name,
+                                              size_t count) {
+  TESSERA_ASSIGN_OR_RETURN(std::vector<float> values, ReadVector<float>(container, name));
+  if (values.size() != count || !AllFiniteValues(values)) {
+    return absl::InvalidArgumentError(absl::StrCat("section '", absl::string_view(name.data(), name.size()),
+                                                   "': ", values.size(), " values, expected ", count,
+                                                   " finite ones"));
+  }
+  return values;
+}
+
+// Reads the entries of a table from the section of its name.
+absl::Status ReadEntries(const Container& container, const std::string& name,
+                         std::span<const int64_t> entries, CodecTable& table) {
+  const std::array<int64_t, 1> shape = {static_cast<int64_t>(entries.size())};
+  TESSERA_ASSIGN_OR_RETURN(const Section* section, RequireSection(container, name, table.dtype, shape));
+  const auto scatter = [&](const auto& values) {
+    for (size_t i = 0; i < entries.size(); ++i) {
+      table.values[static_cast<size_t>(entries[i])] = static_cast<float>(values[i]);
+    }
+  };
+  switch (table.dtype) {
+    case DType::kU8:
+      scatter(SectionValues<uint8_t>(*section));
+      return absl::OkStatus();
+    case DType::kU16:
+      scatter(SectionValues<uint16_t>(*section));
+      return absl::OkStatus();
+    default:
+      break;
+  }
+  const std::vector<float> values = SectionValues<float>(*section);
+  if (!AllFiniteValues(values)) {
+    return absl::InvalidArgumentError(absl::StrCat("section '", name, "': a value is not finite"));
+  }
+  scatter(values);
+  return absl::OkStatus();
+}
+
+absl::StatusOr<CodecTable> EmptyTable(const std::string& name, const nlohmann::json& declared) {
+  CodecTable table;
+  int64_t size = 1;
+  const auto refused = [&name](std::string_view what) {
+    return absl::InvalidArgumentError(
+        absl::StrCat("header: codec table '", name, "': ", absl::string_view(what.data(), what.size())));
+  };
+  if (!declared.is_object() || !declared.contains("shape") || !declared.at("shape").is_array() ||
+      declared.at("shape").size() > 8 || !declared.contains("dtype") || !declared.at("dtype").is_string()) {
+    return refused("expected a shape and a dtype");
+  }
+  for (const nlohmann::json& extent : declared.at("shape")) {
+    if (!extent.is_number_integer() || extent.get<int64_t>() < 0 ||
+        __builtin_mul_overflow(size, extent.get<int64_t>(), &size) ||
+        std::cmp_greater(size, kMaxExpandedBytes / sizeof(float))) {
+      return refused(absl::StrCat("an extent is no whole number from 0, or there are more than ",
+                                  kMaxExpandedBytes, " bytes"));
+    }
+    table.shape.push_back(extent.get<int64_t>());
+  }
+  const std::string dtype = declared.at("dtype").get<std::string>();
+  for (const DType known : {DType::kU8, DType::kU16, DType::kF32}) {
+    if (dtype == DTypeName(known)) {
+      table.dtype = known;
+      table.values.assign(static_cast<size_t>(size), 0.0F);
+      return table;
+    }
+  }
+  return refused("dtype is none of u8, u16 and f32");
+}
+
+}  // namespace
+
+absl::StatusOr<TileSetAssembler> TileSetAssembler::Begin(std::span<const std::byte> part) {
+  TESSERA_ASSIGN_OR_RETURN(const Container container, ParseContainerOfKind(part, kTileSetPartKind));
+  TESSERA_ASSIGN_OR_RETURN(const int index, ReadInteger(container.header, "part", 0, kMostParts));
+  if (index != 0) {
+    return absl::FailedPreconditionError(absl::StrCat("part ", index, " of a tile set, expected part 0"));
+  }
+  TileSetAssembler assembler;
+  assembler.first_sha256_ = Sha256Hex(part);
+  TESSERA_RETURN_IF_ERROR(assembler.ReadHead(container));
+  TESSERA_RETURN_IF_ERROR(assembler.AddColumns(container));
+  // Whoever saves or draws the set meets the checks of every tile set here.
+  TESSERA_RETURN_IF_ERROR(CheckTileSet(assembler.tile_set_));
+  return assembler;
+}
+
+absl::Status TileSetAssembler::ReadHead(const Container& container) {
+  const nlohmann::json& header = container.header;
+  TESSERA_ASSIGN_OR_RETURN(ArrangementName arrangement, ReadArrangementName(header));
+  tile_set_.arrangement_id = std::move(arrangement.id);
+  tile_set_.arrangement_sha256 = std::move(arrangement.sha256);
+  TESSERA_ASSIGN_OR_RETURN(tile_set_.strip_height, ReadInteger(header, "strip_height", 1, kMostTexelsOfSide));
+  TESSERA_ASSIGN_OR_RETURN(tile_set_.radiometry, HeaderString(header, "radiometry"));
+  TESSERA_ASSIGN_OR_RETURN(tile_set_.provenance, ReadProvenance(container));
+  TESSERA_ASSIGN_OR_RETURN(origin_, ReadObject(header, "origin"));
+  TESSERA_RETURN_IF_ERROR(ReadTables(header, container));
+  return ReadTiles(container);
+}
+
+absl::Status TileSetAssembler::ReadTables(const nlohmann::json& header, const Container& container) {
+  BtfelTable& table = tile_set_.btfels;
+  TESSERA_ASSIGN_OR_RETURN(const nlohmann::json codec, ReadObject(header, "codec"));
+  TESSERA_ASSIGN_OR_RETURN(table.codec_id, HeaderString(codec, "id"));
+  TESSERA_ASSIGN_OR_RETURN(table.codec_version,
+                           ReadInteger(codec, "version", 0, std::numeric_limits<int>::max()));
+  TESSERA_ASSIGN_OR_RETURN(table.parameters, ReadObject(codec, "parameters"));
+  TESSERA_ASSIGN_OR_RETURN(table.offset, ReadVector<float>(container, "fill"));
+  if (table.offset.empty() || std::cmp_greater(table.offset.size(), kMostCoefficients) ||
+      !AllFiniteValues(table.offset)) {
+    return absl::InvalidArgumentError(absl::StrCat("section 'fill': ", table.offset.size(),
+                                                   " values, expected 1 to ", kMostCoefficients,
+                                                   " finite ones"));
+  }
+  table.num_coefficients = static_cast<int>(table.offset.size());
+  table.step.assign(table.offset.size(), 0.0F);
+  TESSERA_ASSIGN_OR_RETURN(table.views, ReadDirections("views", container));
+  TESSERA_ASSIGN_OR_RETURN(table.lights, ReadDirections("lights", container));
+  TESSERA_ASSIGN_OR_RETURN(const nlohmann::json tables, ReadObject(codec, "tables"));
+  CoefficientTables::Shapes shapes;
+  uint64_t table_bytes = 0;
+  for (const auto& [name, declared] : tables.items()) {
+    TESSERA_ASSIGN_OR_RETURN(CodecTable empty, EmptyTable(name, declared));
+    table_bytes += empty.values.size() * sizeof(float);
+    if (table_bytes > kMaxExpandedBytes) {
+      return absl::InvalidArgumentError(
+          absl::StrCat("codec tables of ", table_bytes, " bytes, at most ", kMaxExpandedBytes));
+    }
+    shapes[name] = empty.shape;
+    table.tables[name] = std::move(empty);
+  }
+  TESSERA_ASSIGN_OR_RETURN(tables_,
+                           CoefficientTables::Create(table.codec_id, table.num_coefficients, shapes));
+  for (auto& [name, codec_table] : table.tables) {
+    if (!tables_->IsSplit(name)) {
+      std::vector<int64_t> all(codec_table.values.size());
+      std::iota(all.begin(), all.end(), int64_t{0});
+      TESSERA_RETURN_IF_ERROR(ReadEntries(container, name, all, codec_table));
+    }
+  }
+  return absl::OkStatus();
+}
+
+absl::Status TileSetAssembler::ReadTiles(const Container& container) {
+  TESSERA_ASSIGN_OR_RETURN(tile_set_.tile_codes, ReadVector<uint32_t>(container, "tile_codes"));
+  const size_t all_tiles = tile_set_.tile_codes.size();
+  if (container.Find("tiles") != nullptr) {
+    TESSERA_ASSIGN_OR_RETURN(tiles_, ReadVector<uint32_t>(container, "tiles"));
+    if (tiles_.empty() || tiles_.back() >= all_tiles ||
+        std::ranges::adjacent_find(tiles_, std::greater_equal()) != tiles_.end()) {
+      return absl::InvalidArgumentError(
+          absl::StrCat("section 'tiles': empty, or not strictly ascending below ", all_tiles));
+    }
+  }
+  const size_t num_tiles = tiles_.empty() ? all_tiles : tiles_.size();
+  TESSERA_ASSIGN_OR_RETURN(const Section* section,
+                           RequireSection(container, "tile_index", DType::kU32,
+                                          std::array<int64_t, 3>{static_cast<int64_t>(num_tiles), -1, -1}));
+  const int64_t w = section->shape[1];
+  if (w != section->shape[2] || w < 1 || w > kMostTexelsOfSide) {
+    return absl::InvalidArgumentError(absl::StrCat("section 'tile_index': tiles of ", section->shape[2], "x",
+                                                   w, ", expected square ones of 1 to ", kMostTexelsOfSide));
+  }
+  const auto texels = static_cast<size_t>(w * w);
+  if (all_tiles > kMaxExpandedBytes / sizeof(uint32_t) / texels) {
+    return absl::InvalidArgumentError(absl::StrCat("section 'tile_codes': ", all_tiles, " tiles of ", w, "x",
+                                                   w, " texels take more than ", kMaxExpandedBytes,
+                                                   " bytes"));
+  }
+  std::vector<uint32_t> index = SectionValues<uint32_t>(*section);
+  for (size_t tile = 0; tile < num_tiles; ++tile) {
+    RestoreTexels(static_cast<int>(w), std::span(index).subspan(tile * texels, texels));
+  }
+  // BTFels are numbered by their rank among the labels that occur.
+  std::vector<uint32_t> labels(index.size());
+  std::ranges::transform(index, labels.begin(), &BtfelOfTexel);
+  std::ranges::sort(labels);
+  labels.erase(std::ranges::unique(labels).begin(), labels.end());
+  num_btfels_ = labels.size();
+  const auto k = static_cast<size_t>(tile_set_.btfels.num_coefficients);
+  if (num_btfels_ > kMaxExpandedBytes / k) {
+    return absl::InvalidArgumentError(absl::StrCat(
+        num_btfels_, " BTFels of ", k, " coefficients take more than ", kMaxExpandedBytes, " bytes"));
+  }
+  std::vector<uint32_t> rank(static_cast<size_t>(labels.empty() ? 0 : labels.back()) + 1);
+  for (size_t i = 0; i < labels.size(); ++i) {
+    rank[labels[i]] = static_cast<uint32_t>(i);
+  }
+  tile_set_.tile_size = static_cast<int>(w);
+  tile_set_.tile_index.assign(all_tiles * texels, 0);
+  size_t from = 0;
+  ForTiles(tiles_, all_tiles, [&](size_t tile) {
+    for (size_t i = 0; i < texels; ++i, ++from) {
+      tile_set_.tile_index[tile * texels + i] =
+          PackTexel(rank[BtfelOfTexel(index[from])], TurnsOfTexel(index[from]));
+    }
+  });
+  TESSERA_ASSIGN_OR_RETURN(const std::string labels_are, HeaderString(container.header, "labels"));
+  if (labels_are == kPixelLabels) {
+    tile_set_.source_pixels = std::move(labels);
+  }
+  tile_set_.btfels.codes.assign(num_btfels_ * k, 0);
+  return absl::OkStatus();
+}
+
+absl::Status TileSetAssembler::AddColumns(const Container& container) {
+  const auto k = static_cast<size_t>(tile_set_.btfels.num_coefficients);
+  TESSERA_ASSIGN_OR_RETURN(const std::vector<uint32_t> columns,
+                           ReadVector<uint32_t>(container, "coefficients"));
+  std::vector<bool> taken(k, false);
+  for (const uint32_t coefficient : held_) {
+    taken[coefficient] = true;
+  }
+  for (const uint32_t coefficient : columns) {
+    if (coefficient >= k || taken[coefficient]) {
+      return absl::InvalidArgumentError(absl::StrCat("section 'coefficients': ", coefficient, " of ", k,
+                                                     " is out of range or came before"));
+    }
+    taken[coefficient] = true;
+  }
+  TESSERA_ASSIGN_OR_RETURN(const std::vector<float> offset, ReadFinite(container, "offset", columns.size()));
+  TESSERA_ASSIGN_OR_RETURN(const std::vector<float> step, ReadFinite(container, "step", columns.size()));
+  if (columns.empty() || std::ranges::any_of(step, [](float s) { return s < 0.0F; })) {
+    return absl::InvalidArgumentError("section 'step': no values, or a negative one");
+  }
+  const std::array<int64_t, 2> shape = {static_cast<int64_t>(num_btfels_),
+                                        static_cast<int64_t>(columns.size())};
+  TESSERA_ASSIGN_OR_RETURN(const Section* codes,
+                           RequireSection(container, absl::StrCat("btfels.", num_parts_), DType::kU8, shape));
+
+  // Everything but the codes is tried on a copy first.
+  BtfelTable& table = tile_set_.btfels;
+  CodeBuffer all_codes = std::move(table.codes);
+  BtfelTable shared = table;
+  table.codes = std::move(all_codes);
+  for (size_t i = 0; i < columns.size(); ++i) {
+    shared.offset[columns[i]] = offset[i];
+    shared.step[columns[i]] = step[i];
+  }
+  for (auto& [name, codec_table] : shared.tables) {
+    if (tables_->IsSplit(name)) {
+      TESSERA_RETURN_IF_ERROR(
+          ReadEntries(container, name, tables_->EntriesOf(name, columns, held_), codec_table));
+    }
+  }
+  TESSERA_RETURN_IF_ERROR(MakeDecoder(shared).status());
+
+  shared.codes = std::move(table.codes);
+  table = std::move(shared);
+  const char* from = codes->bytes.data();
+  for (size_t btfel = 0; btfel < num_btfels_; ++btfel) {
+    uint8_t* const to = table.codes.data() + btfel * k;
+    for (const uint32_t coefficient : columns) {
+      to[coefficient] = static_cast<uint8_t>(*from++);
+    }
+  }
+  held_.insert(held_.end(), columns.begin(), columns.end());
+  ++num_parts_;
+  Record();
+  return absl::OkStatus();
+}
+
+absl::Status TileSetAssembler::Add(std::span<const std::byte> part) {
+  TESSERA_ASSIGN_OR_RETURN(const Container container, ParseContainerOfKind(part, kTileSetPartKind));
+  TESSERA_ASSIGN_OR_RETURN(const int index, ReadInteger(container.header, "part", 0, kMostParts));
+  TESSERA_ASSIGN_OR_RETURN(const std::string first, HeaderString(container.header, "first_sha256"));
+  if (std::cmp_not_equal(index, num_parts_) || first != first_sha256_) {
+    return absl::FailedPreconditionError(absl::StrCat("part ", index, " of the tile set that begins with ",
+                                                      first.substr(0, 64), ", expected part ", num_parts_,
+                                                      " of ", first_sha256_));
+  }
+  return AddColumns(container);
+}
+
+void TileSetAssembler::Record() {
+  nlohmann::json record = origin_;
+  if (!tiles_.empty()) {
+    record["tiles"] = tiles_;
+  }
+  record["num_coefficients"] = held_.size();
+  tile_set_.metadata[kPartKey] = std::move(record);
+}
+
+std::optional<std::vector<uint32_t>> TilesHeld(const TileSet& tile_set) {
+  const auto part = tile_set.metadata.find(kPartKey);
+  if (part == tile_set.metadata.end() || !part->is_object() || !part->contains("tiles") ||
+      !part->at("tiles").is_array()) {
+    return std::nullopt;
+  }
+  std::vector<uint32_t> tiles;
+  for (const nlohmann::json& tile : part->at("tiles")) {
+    if (tile.is_number_unsigned()) {
+      tiles.push_back(static_cast<uint32_t>(tile.get<uint64_t>()));
+    }
+  }
+  return tiles;
+}
+
+}  // namespace tessera
