@@ -32,7 +32,7 @@ bool IsDigest(std::string_view text) {
 }  // namespace
 
 BlobCache::BlobCache(fs::path folder, uint64_t limit_bytes)
-    : folder_(std::move(folder)), limit_bytes_(limit_bytes) {}
+    : folder_(std::move(folder)), limit_bytes_(limit_bytes == 0 ? kCacheLimitBytes : limit_bytes) {}
 
 fs::path BlobCache::BlobPath(std::string_view sha256) const {
   return folder_ / "blobs" / sha256.substr(0, 2) / sha256;
@@ -54,6 +54,13 @@ std::optional<std::string> BlobCache::Read(std::string_view sha256) const {
   }
   fs::last_write_time(path, fs::file_time_type::clock::now(), ignored);  // used just now, see DropOldest
   return *std::move(bytes);
+}
+
+absl::Status BlobCache::Put(std::string_view sha256, std::string_view bytes) const {
+  TESSERA_ASSIGN_OR_RETURN(Partial partial, Begin(sha256));
+  TESSERA_RETURN_IF_ERROR(partial.Clear());
+  TESSERA_RETURN_IF_ERROR(partial.Append(bytes));
+  return Finish(std::move(partial), sha256);
 }
 
 BlobCache::Partial::Partial(int descriptor, fs::path path)

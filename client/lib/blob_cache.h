@@ -23,10 +23,14 @@ inline constexpr uint64_t kCacheLimitBytes = uint64_t{4} << 30;
 // Stateless: safe to share between threads and processes.
 class BlobCache {
  public:
+  // 0: kCacheLimitBytes.
   explicit BlobCache(std::filesystem::path folder, uint64_t limit_bytes = kCacheLimitBytes);
 
   // The blob, or nothing when it is not here. A file whose bytes do not match its name is removed.
   [[nodiscard]] std::optional<std::string> Read(std::string_view sha256) const;
+
+  // Keeps bytes whose digest the caller has checked. Errors: those of Begin and Finish.
+  [[nodiscard]] absl::Status Put(std::string_view sha256, std::string_view bytes) const;
 
   // A download in progress, held by one process at a time. Not thread-safe.
   class Partial {

@@ -23,6 +23,7 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include <absl/status/status.h>
@@ -31,6 +32,7 @@
 #include "btf/base/run_context.h"
 #include "btf/codec/material.h"
 #include "btf/wang/dressing.h"
+#include "btf/wang/scene_needs.h"
 #include "btf/wang/tile_set.h"
 #include "tessera/v1/tessera.pb.h"
 
@@ -55,7 +57,28 @@ struct ClientOptions {
   RetryPolicy retry;
   // Empty: DefaultCacheFolder().
   std::filesystem::path cache_folder;
+  // What the cache may take before the longest unused goes; 0: 4 GiB.
+  uint64_t cache_limit_bytes = 0;
 };
+
+// How far a streamed tile set has come.
+struct StreamProgress {
+  v1::TileSetPlan plan;      // all parts that the needs are worth, with their errors
+  size_t num_parts = 0;      // of the plan, that are here
+  uint64_t part_bytes = 0;   // of these
+  uint64_t moved_bytes = 0;  // that came from the server: plans, and parts that were not in the cache
+
+  // RMSE against the whole, as TileSetPart.rmse; once a part is here.
+  [[nodiscard]] double rmse() const { return plan.parts(static_cast<int>(num_parts) - 1).rmse(); }
+  [[nodiscard]] bool is_all() const { return std::cmp_equal(num_parts, plan.parts_size()); }
+};
+struct StreamedTileSet {
+  TileSet tile_set;  // can be drawn; wang/tile_set_parts.h says what it lacks
+  StreamProgress progress;
+};
+enum class AfterPart { kGoOn, kStop };
+// Called after each part, the first included, on the calling thread.
+using OnPart = std::function<AfterPart(const TileSet& tile_set, const StreamProgress& progress)>;
 
 // $XDG_CACHE_HOME/tessera, else ~/.cache/tessera, else a folder of the user's in the temporary folder.
 [[nodiscard]] std::filesystem::path DefaultCacheFolder();
@@ -152,6 +175,14 @@ class Client {
   // up on the server: it may point to new bytes).
   [[nodiscard]] absl::StatusOr<Material> FetchMaterial(std::string_view name, const RunContext& context = {});
   [[nodiscard]] absl::StatusOr<TileSet> FetchTileSet(std::string_view name, const RunContext& context = {});
+  // Only what a scene needs of a tile set, the most visible first: NeedsOfDressing (wang/scene_needs.h) tells
+  // the tiles of a dressing. Ends after the plan's last part, or when `on_part` says so. Parts are kept in
+  // the cache by their digest, also when the stream is stopped; a lost connection is taken up again after the
+  // last whole part. Errors: the server's; DATA_LOSS when a part is not what the plan says, or not what was
+  // asked for.
+  [[nodiscard]] absl::StatusOr<StreamedTileSet> StreamTileSet(std::string_view name, const SceneNeeds& needs,
+                                                              const OnPart& on_part = {},
+                                                              const RunContext& context = {});
   [[nodiscard]] absl::StatusOr<Dressing> FetchDressing(const v1::Blob& blob, const RunContext& context = {});
   // The bytes of a blob, from the cache or downloaded into it. A cache that cannot be written is not an
   // error.

@@ -332,7 +332,7 @@ absl::Status Client::DownloadFile(const v1::Blob& blob, const std::filesystem::p
 }
 
 absl::StatusOr<std::string> Client::FetchBlob(const v1::Blob& blob, const RunContext& context) {
-  const BlobCache cache(options_.cache_folder);
+  const BlobCache cache(options_.cache_folder, options_.cache_limit_bytes);
   if (std::optional<std::string> cached = cache.Read(blob.sha256())) {
     return *std::move(cached);
   }

@@ -118,6 +118,12 @@ class TileSetsAdapter final : public v1::TileSets::Service {
                              v1::DeleteTileSetResponse* response) override {
     return Answer(service_.DeleteTileSet(*request), response);
   }
+  grpc::Status StreamTileSet(ServerContext* context, const v1::StreamTileSetRequest* request,
+                             grpc::ServerWriter<v1::TileSetChunk>* writer) override {
+    return GrpcFromStatus(
+        service_.StreamTileSet(*request, CancelledBy(context),
+                               [writer](const v1::TileSetChunk& chunk) { return writer->Write(chunk); }));
+  }
 
  private:
   TileSetsService service_;

@@ -1,5 +1,6 @@
 #include "server/rpc/tile_sets.h"
 
+#include <algorithm>
 #include <span>
 
 #include <absl/strings/str_cat.h>
@@ -154,6 +155,38 @@ absl::StatusOr<v1::DeleteTileSetResponse> TileSetsService::DeleteTileSet(
       Mutate(backend_, "DeleteTileSet", request.request_id(), request, response,
              [&](Database& db) { return tessera::DeleteTileSet(db, id, backend_.clock()); }));
   return response;
+}
+
+absl::Status TileSetsService::StreamTileSet(const v1::StreamTileSetRequest& request,
+                                            const IsCancelled& is_cancelled,
+                                            const std::function<bool(const v1::TileSetChunk&)>& write) {
+  TESSERA_ASSIGN_OR_RETURN(const SceneNeeds needs, SceneNeedsFromMessage(request.needs()));
+  TESSERA_ASSIGN_OR_RETURN(const v1::TileSet tile_set, GetNamed(request.name()));
+  PlannedStream planned;
+  TESSERA_RETURN_IF_ERROR(RunForCaller(is_cancelled, [&](const RunContext& context) -> absl::Status {
+    TESSERA_ASSIGN_OR_RETURN(planned, streams_.Plan(tile_set, needs, context));
+    return absl::OkStatus();
+  }));
+  v1::TileSetChunk chunk;
+  *chunk.mutable_plan() = planned.plan;
+  if (!write(chunk)) {
+    return absl::CancelledError("the caller went away");
+  }
+  chunk.clear_plan();
+  const auto is_held = [&](size_t part) {
+    return std::ranges::find(request.held_parts(), part) != request.held_parts().end();
+  };
+  for (size_t part = 0; part < planned.parts.size() && !request.plan_only(); ++part) {
+    const std::string& bytes = *planned.parts[part];
+    chunk.set_part(static_cast<uint32_t>(part));
+    for (size_t offset = 0; offset < bytes.size() && !is_held(part); offset += kChunkBytes) {
+      chunk.set_data(bytes.substr(offset, kChunkBytes));
+      if (!write(chunk)) {
+        return absl::CancelledError("the caller went away");
+      }
+    }
+  }
+  return absl::OkStatus();
 }
 
 }  // namespace tessera
