@@ -15,6 +15,7 @@
 #include "client/cli/describe.h"
 #include "client/cli/mask.h"
 #include "client/cli/pattern.h"
+#include "client/cli/pull.h"
 #include "client/lib/names.h"
 
 namespace tessera::cli {
@@ -143,17 +144,6 @@ absl::Status ShowTileSet(Session& session, const std::string& name) {
   TESSERA_ASSIGN_OR_RETURN(Client * client, session.Connect());
   TESSERA_ASSIGN_OR_RETURN(const v1::TileSet tile_set, client->GetTileSet(full_name, session.Context()));
   session.Answer(Describe(tile_set), TextRecord(Describe(tile_set)));
-  return absl::OkStatus();
-}
-
-absl::Status RunPull(Session& session, const std::string& name, const std::string& output) {
-  TESSERA_ASSIGN_OR_RETURN(const std::string full_name, FullTileSetName(name));
-  TESSERA_ASSIGN_OR_RETURN(Client * client, session.Connect());
-  const RunContext context = session.Context();
-  TESSERA_ASSIGN_OR_RETURN(const v1::TileSet tile_set, client->GetTileSet(full_name, context));
-  TESSERA_RETURN_IF_ERROR(client->DownloadFile(tile_set.blob(), output, context));
-  session.FinishStages();
-  session.Answer({{"file", output}, {"tile_set", Describe(tile_set)}}, output);
   return absl::OkStatus();
 }
 
@@ -320,7 +310,6 @@ void AddTileSetCommands(CLI::App& app, Session& session) {
 
   const auto name = std::make_shared<std::string>();
   const auto arrangement = std::make_shared<std::string>();
-  const auto output = std::make_shared<std::string>();
   CLI::App* list = noun->add_subcommand("list", "Every tile set");
   list->add_option("--arrangement", *arrangement, "Only those of this arrangement");
   list->callback([&session, arrangement] {
@@ -332,12 +321,7 @@ void AddTileSetCommands(CLI::App& app, Session& session) {
   show->callback(
       [&session, name] { session.run = [&session, name] { return ShowTileSet(session, *name); }; });
 
-  CLI::App* pull = noun->add_subcommand("pull", "Download a tile set's container");
-  pull->add_option("TILESET", *name, "ARRANGEMENT/NAME")->required();
-  pull->add_option("-o,--output", *output, "File to write, .tsra")->required();
-  pull->callback([&session, name, output] {
-    session.run = [&session, name, output] { return RunPull(session, *name, *output); };
-  });
+  AddPull(*noun, session);
 
   const auto certify_flags = std::make_shared<CertifyFlags>();
   CLI::App* certify =
