@@ -60,7 +60,7 @@ absl::StatusOr<int> LevelForPixels(int tile_size, double pixels_per_quad) {
     return RefuseNeed(absl::StrCat("pixels per quad ", pixels_per_quad, ", expected a number above 0"),
                       "pixels_per_quad");
   }
-  const double level = std::floor(std::log2(tile_size / pixels_per_quad));
+  const double level = std::floor(std::log2(tile_size / pixels_per_quad) - kLevelBias);
   return static_cast<int>(std::clamp(level, 0.0, static_cast<double>(LastMipLevel(tile_size))));
 }
 

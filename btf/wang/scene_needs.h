@@ -1,7 +1,7 @@
 // What a scene shows of a tile set, so that nothing else is sent: tiles, mip level, accuracy.
 //
 //   SceneNeeds needs = NeedsOfDressing(dressing);
-//   needs.level = LevelForPixels(/*tile_size=*/64, /*pixels_per_quad=*/8.0);  // 3
+//   needs.level = LevelForPixels(/*tile_size=*/64, /*pixels_per_quad=*/8.0);  // 2
 //   TESSERA_RETURN_IF_ERROR(CheckNeeds(needs, num_tiles, tile_size));
 #pragma once
 
@@ -35,8 +35,11 @@ struct SceneNeeds {
 // The tiles of the dressing, ascending, each once.
 [[nodiscard]] SceneNeeds NeedsOfDressing(const Dressing& dressing);
 
-// The coarsest level with at least a texel for each pixel, for quads that are at most `pixels_per_quad`
-// pixels wide: the whole part of log2(tile_size / pixels_per_quad), from 0 to the last level that the tile
+// Renderers blend levels about log2(texels a pixel's side) - kLevelBias (render/preview_scene.h: kMipBias).
+inline constexpr double kLevelBias = 0.5;
+
+// The coarsest level from which quads that are at most `pixels_per_quad` pixels wide look as from all levels:
+// the whole part of log2(tile_size / pixels_per_quad) - kLevelBias, from 0 to the last level that the tile
 // size allows. Errors: INVALID_ARGUMENT when the pixels are not finite or not above 0.
 [[nodiscard]] absl::StatusOr<int> LevelForPixels(int tile_size, double pixels_per_quad);
 

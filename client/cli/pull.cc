@@ -8,6 +8,7 @@
 
 #include "btf/base/atomic_file.h"
 #include "btf/base/status_macros.h"
+#include "btf/render/preview_scene.h"
 #include "btf/wang/dressing.h"
 #include "btf/wang/scene_needs.h"
 #include "client/cli/describe.h"
@@ -16,6 +17,8 @@
 
 namespace tessera::cli {
 namespace {
+
+static_assert(kLevelBias == kMipBias, "levels are sent for our own renderer, too");
 
 struct PullFlags {
   std::string name;
@@ -139,7 +142,7 @@ void AddPull(CLI::App& noun, Session& session) {
       "--level", flags->level, "Only this mip level, 0 the tile set itself: tiles of half the texels each");
   command
       ->add_option("--pixels-per-quad", flags->pixels_per_quad,
-                   "Only the coarsest mip level with a texel for each pixel of quads so many pixels wide")
+                   "Only the coarsest mip level from which quads so many pixels wide look as from all")
       ->excludes(level);
   command->add_option("--max-error", flags->max_error,
                       "Only the coefficients that it takes: RMSE in reflectance against all of them");

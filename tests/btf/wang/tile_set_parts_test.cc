@@ -179,10 +179,11 @@ TEST(SceneNeedsTest, FollowFromADressingAndItsSize) {
   EXPECT_THAT(NeedsOfDressing(dressing).tiles, ElementsAre(3, 7, 90));
   EXPECT_EQ(LevelForPixels(64, 64.0).value(), 0);
   EXPECT_EQ(LevelForPixels(64, 1000.0).value(), 0);
-  EXPECT_EQ(LevelForPixels(64, 8.0).value(), 3);
-  EXPECT_EQ(LevelForPixels(64, 7.9).value(), 3);
+  EXPECT_EQ(LevelForPixels(64, 8.0).value(), 2);
+  EXPECT_EQ(LevelForPixels(64, 5.6).value(), 3);
   EXPECT_EQ(LevelForPixels(64, 0.001).value(), 6);
   EXPECT_EQ(LevelForPixels(36, 1.0).value(), 2);
+  EXPECT_EQ(LevelForPixels(64, 23.0).value(), 0);
   for (const double pixels : {0.0, -1.0, std::nan(""), std::numeric_limits<double>::infinity()}) {
     EXPECT_TRUE(absl::IsInvalidArgument(LevelForPixels(64, pixels).status())) << pixels;
   }
