@@ -182,6 +182,7 @@ class StreamBench {
     bool is_cold = true;
     double flip_within = 1.0;
     double share_within = 0.0;
+    double share_first = 0.0;
     double share_needed = 0.0;
     double flip = 1.0;
     (void)Must(client_->StreamTileSet(kName, needs, [&](const TileSet& part, const StreamProgress& progress) {
@@ -198,10 +199,12 @@ class StreamBench {
         share_within = share;
         Save(name + "-part", got);
       }
+      share_first = share_needed == 0.0 ? share : share_first;
       share_needed = share;
       return flip < kMostFlip && share_within > 0.0 ? AfterPart::kStop : AfterPart::kGoOn;
     }));
-    Print(name + "_share", share_within, "", kMostFarShare);
+    // Where even the first part is too large, its share.
+    Print(name + "_share", share_within > 0.0 ? share_within : share_first, "", kMostFarShare);
     Print(name + (flip < kMostFlip ? "_share_for_flip_0.02" : "_share_of_all"), share_needed, "", 0.0);
     Print(name + "_flip_of_these", flip, "", 0.0);
     return Print(name + "_flip", flip_within, "", kMostFlip);
