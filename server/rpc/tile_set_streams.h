@@ -44,8 +44,8 @@ class TileSetStreams {
   explicit TileSetStreams(BlobStore& blobs, uint64_t limit_bytes = kKeptStreamBytes)
       : blobs_(blobs), limit_bytes_(limit_bytes) {}
 
-  // Errors: INVALID_ARGUMENT naming the field and its limit; RESOURCE_EXHAUSTED, reason LIMIT_REACHED, naming
-  // what would be needed where max_bytes does not reach; those of MakeLevelSet; CANCELLED.
+  // Errors: INVALID_ARGUMENT naming the field and its limit; FAILED_PRECONDITION, reason BOUND_NOT_REACHED,
+  // naming what would be needed where max_bytes does not reach; those of MakeLevelSet; CANCELLED.
   [[nodiscard]] absl::StatusOr<PlannedStream> Plan(const v1::TileSet& tile_set, const SceneNeeds& needs,
                                                    const RunContext& context);
 
