@@ -2,16 +2,27 @@
 #include <array>
 #include <cmath>
 
+#include <absl/strings/str_cat.h>
+#include <Eigen/Geometry>
+
+#include "btf/base/status_macros.h"
 #include "btf/render/preview.h"
 #include "btf/render/preview_scene.h"
 
 namespace tessera {
+namespace {
 
-Camera FramingCamera(const QuadMesh& mesh, int width, int height) {
-  Camera camera;
-  if (mesh.positions.empty() || width <= 0 || height <= 0) {
-    return camera;
-  }
+// Room around a framed mesh.
+constexpr double kMargin = 1.08;
+constexpr int kOrbitSteps = 72;
+
+struct Bounds {
+  Eigen::Vector3d centre;
+  Eigen::Vector3d extent;
+  double largest = 0.0;  // of the extent, not 0
+};
+
+Bounds BoundsOf(const QuadMesh& mesh) {
   Eigen::Vector3d low = mesh.positions[0].cast<double>();
   Eigen::Vector3d high = low;
   for (const Eigen::Vector3f& position : mesh.positions) {
@@ -19,27 +30,92 @@ Camera FramingCamera(const QuadMesh& mesh, int width, int height) {
     high = high.cwiseMax(position.cast<double>());
   }
   const Eigen::Vector3d extent = high - low;
-  camera.target = 0.5 * (low + high);
-  // Flat meshes are looked at along their normal; solids from a little above.
-  const double largest = std::max(extent.maxCoeff(), 1e-9);
-  const bool flat = extent.z() < 1e-3 * largest;
-  const double elevation_rad = RadFromDeg(flat ? 0.0 : 25.0);
-  const Eigen::Vector3d back(0.0, std::sin(elevation_rad), std::cos(elevation_rad));
-  const Eigen::Vector3d up(0.0, std::cos(elevation_rad), -std::sin(elevation_rad));
-  const double tan_y = std::tan(0.5 * camera.fov_y_rad);
-  const double tan_x = tan_y * width / height;
-  // The nearest eye on the ray `back` that keeps every vertex inside the frame, with a margin around it.
-  constexpr double kMargin = 1.08;
+  return {.centre = 0.5 * (low + high), .extent = extent, .largest = std::max(extent.maxCoeff(), 1e-9)};
+}
+
+// Axes of an eye at an azimuth about the y axis, from +z towards +x, and an elevation above the horizon.
+struct Axes {
+  Axes(double azimuth_rad, double elevation_rad)
+      : right(std::cos(azimuth_rad), 0.0, -std::sin(azimuth_rad)),
+        back(std::sin(azimuth_rad) * std::cos(elevation_rad), std::sin(elevation_rad),
+             std::cos(azimuth_rad) * std::cos(elevation_rad)),
+        up(back.cross(right)) {}
+
+  Eigen::Vector3d right;
+  Eigen::Vector3d back;
+  Eigen::Vector3d up;
+};
+
+// The least distance of the eye from the centre at which every vertex lies inside the frame.
+double FramingDistance(const QuadMesh& mesh, const Bounds& bounds, const Axes& axes, double tan_x,
+                       double tan_y) {
   double distance = 0.0;
   for (const Eigen::Vector3f& position : mesh.positions) {
-    const Eigen::Vector3d p = position.cast<double>() - camera.target;
-    const double towards_eye = p.dot(back);
-    distance = std::max({distance, towards_eye + kMargin * std::abs(p.x()) / tan_x,
-                         towards_eye + kMargin * std::abs(p.dot(up)) / tan_y, towards_eye + 0.05 * largest});
+    const Eigen::Vector3d p = position.cast<double>() - bounds.centre;
+    const double towards_eye = p.dot(axes.back);
+    distance = std::max({distance, towards_eye + kMargin * std::abs(p.dot(axes.right)) / tan_x,
+                         towards_eye + kMargin * std::abs(p.dot(axes.up)) / tan_y,
+                         towards_eye + 0.05 * bounds.largest});
   }
-  camera.eye = camera.target + distance * back;
+  return distance;
+}
+
+absl::Status CheckRange(const char* name, double value, double least, double most) {
+  if (!(value >= least && value <= most)) {
+    return absl::InvalidArgumentError(
+        absl::StrCat("orbit ", name, ": ", value, ", expected ", least, " to ", most));
+  }
+  return absl::OkStatus();
+}
+
+}  // namespace
+
+Camera FramingCamera(const QuadMesh& mesh, int width, int height) {
+  Camera camera;
+  if (mesh.positions.empty() || width <= 0 || height <= 0) {
+    return camera;
+  }
+  const Bounds bounds = BoundsOf(mesh);
+  // Flat meshes are looked at along their normal; solids from a little above.
+  const bool flat = bounds.extent.z() < 1e-3 * bounds.largest;
+  const Axes axes(0.0, RadFromDeg(flat ? 0.0 : 25.0));
+  const double tan_y = std::tan(0.5 * camera.fov_y_rad);
+  camera.target = bounds.centre;
+  camera.eye = camera.target + FramingDistance(mesh, bounds, axes, tan_y * width / height, tan_y) * axes.back;
   camera.up = {0.0, 1.0, 0.0};
   return camera;
+}
+
+absl::StatusOr<Camera> OrbitCamera(const QuadMesh& mesh, const Orbit& orbit, int width, int height) {
+  if (mesh.positions.empty() || width <= 0 || height <= 0) {
+    return absl::InvalidArgumentError("an orbit needs a mesh with vertices and a picture with pixels");
+  }
+  if (!std::isfinite(orbit.azimuth_rad)) {
+    return absl::InvalidArgumentError("orbit azimuth: not a number");
+  }
+  TESSERA_RETURN_IF_ERROR(CheckRange("elevation in degrees", DegFromRad(orbit.elevation_rad), -90.0, 90.0));
+  TESSERA_RETURN_IF_ERROR(CheckRange("distance", orbit.distance, kLeastOrbitDistance, kMostOrbitDistance));
+  TESSERA_RETURN_IF_ERROR(CheckRange("field of view in degrees", DegFromRad(orbit.fov_y_rad),
+                                     kLeastFieldOfViewDeg, kMostFieldOfViewDeg));
+  const Bounds bounds = BoundsOf(mesh);
+  const double tan_y = std::tan(0.5 * orbit.fov_y_rad);
+  double distance = 0.0;
+  for (int step = 0; step < kOrbitSteps; ++step) {
+    const Axes axes(2.0 * kPi * step / kOrbitSteps, orbit.elevation_rad);
+    distance = std::max(distance, FramingDistance(mesh, bounds, axes, tan_y * width / height, tan_y));
+  }
+  const Axes axes(orbit.azimuth_rad, orbit.elevation_rad);
+  Camera camera{.target = bounds.centre, .up = axes.up, .fov_y_rad = orbit.fov_y_rad};
+  camera.eye = camera.target + orbit.distance * distance * axes.back;
+  return camera;
+}
+
+Light LightTurnedAbout(const Light& light, const Eigen::Vector3d& centre, double azimuth_rad) {
+  const Eigen::AngleAxisd turn(azimuth_rad, Eigen::Vector3d::UnitY());
+  Light turned = light;
+  turned.place = light.kind == Light::Kind::kPoint ? Eigen::Vector3d(centre + turn * (light.place - centre))
+                                                   : Eigen::Vector3d(turn * light.place);
+  return turned;
 }
 
 double TexelsPerPixel(const PreviewScene& scene) {

@@ -6,6 +6,7 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include <absl/status/statusor.h>
@@ -22,11 +23,12 @@ namespace tessera {
 
 class OffscreenContext;
 
+// The eye looks at the target; `up` points upwards in the picture, perpendicular or not.
 struct Camera {
   Eigen::Vector3d eye{0, 0, 3};
   Eigen::Vector3d target{0, 0, 0};
   Eigen::Vector3d up{0, 1, 0};
-  double fov_y_rad = RadFromDeg(35.0);
+  double fov_y_rad = RadFromDeg(35.0);  // 0.1..170 degrees, from the lower to the upper edge
 };
 
 struct Light {
@@ -36,6 +38,12 @@ struct Light {
   Eigen::Vector3d place{-0.4, 0.5, 0.8};
   // Irradiance on a facing surface; for a point light at distance 1 (falls with the square).
   Eigen::Vector3d irradiance{kPi, kPi, kPi};
+};
+
+// Shadows of the surface on itself, by shadow maps: what is seen of them, their bias and its price are told
+// in shadow_views.h and preview_scene.h.
+struct ShadowParams {
+  int map_size = 1024;  // texels on a side, 64..2048
 };
 
 // kNearest shows the stored texels as they are: for looking at a synthesis, and as the measure of what
@@ -48,14 +56,33 @@ struct PreviewScene {
   // Of tile_set, or none: what Filter::kBilinear shows where texels are smaller than pixels.
   const TileMips* mips = nullptr;
   Camera camera;
-  std::vector<Light> lights{Light{}};
-  int width = 640;   // 16..8192
-  int height = 480;  // 16..8192
+  std::vector<Light> lights{Light{}};   // at most 4096
+  std::optional<ShadowParams> shadows;  // none: light goes through the surface
+  int width = 640;                      // 16..8192
+  int height = 480;                     // 16..8192
   Filter filter = Filter::kBilinear;
 };
 
 // A camera that sees all of the mesh, from the front and a little above.
 [[nodiscard]] Camera FramingCamera(const QuadMesh& mesh, int width, int height);
+
+// A camera on a circle about the vertical through the middle of the mesh.
+struct Orbit {
+  double azimuth_rad = 0.0;                 // of the eye, from the front (+z) towards +x
+  double elevation_rad = RadFromDeg(25.0);  // above the horizon, -pi/2..pi/2
+  // 1: the least from which the mesh is inside the frame at every azimuth, so that it keeps its size as the
+  // camera goes round; 0.01..1000.
+  double distance = 1.0;
+  double fov_y_rad = RadFromDeg(35.0);
+};
+// Errors: INVALID_ARGUMENT naming the member, its value and the limits, or an empty mesh. Cost: 72 looks at
+// each vertex.
+[[nodiscard]] absl::StatusOr<Camera> OrbitCamera(const QuadMesh& mesh, const Orbit& orbit, int width,
+                                                 int height);
+
+// The light turned about the vertical through `centre` as an orbit's eye is: with both, the mesh seems to
+// turn before a camera and lights that stand still.
+[[nodiscard]] Light LightTurnedAbout(const Light& light, const Eigen::Vector3d& centre, double azimuth_rad);
 
 // Pictures of one tile set on one dressing: its BTFels and the codec's tables stay in the context, so that
 // each picture costs only its drawing. One thread at a time; not while another uses the context.

@@ -76,13 +76,19 @@ absl::Status CheckScene(const PreviewScene& scene) {
     return absl::InvalidArgumentError("camera up is zero");
   }
   const double fov = scene.camera.fov_y_rad;
-  if (!(fov >= RadFromDeg(0.1) && fov <= RadFromDeg(170.0))) {
-    return absl::InvalidArgumentError(
-        absl::StrCat("camera field of view: ", DegFromRad(fov), " degrees, expected 0.1..170"));
+  if (!(fov >= RadFromDeg(kLeastFieldOfViewDeg) && fov <= RadFromDeg(kMostFieldOfViewDeg))) {
+    return absl::InvalidArgumentError(absl::StrCat("camera field of view: ", DegFromRad(fov),
+                                                   " degrees, expected ", kLeastFieldOfViewDeg, "..",
+                                                   kMostFieldOfViewDeg));
   }
   if (scene.lights.size() > kMostPreviewLights) {
     return absl::InvalidArgumentError(
         absl::StrCat(scene.lights.size(), " lights, expected at most ", kMostPreviewLights));
+  }
+  if (scene.shadows.has_value() &&
+      (scene.shadows->map_size < kLeastShadowMap || scene.shadows->map_size > kMostShadowMap)) {
+    return absl::InvalidArgumentError(absl::StrCat("shadow map size: ", scene.shadows->map_size,
+                                                   ", expected ", kLeastShadowMap, "..", kMostShadowMap));
   }
   for (size_t i = 0; i < scene.lights.size(); ++i) {
     const Light& light = scene.lights[i];

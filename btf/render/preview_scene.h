@@ -12,6 +12,13 @@
 // kMipBias, between the tile set itself (0) and its coarsest level.
 // With Filter::kNearest a group shows the one texel that its mean lies in.
 // The pixel is the mean over its covered samples; alpha is their share.
+//
+// With shadows a light counts where it is seen from, once a group. Flat faces would shadow themselves in
+// facets where a smooth surface turns away from a light; so what receives light is not the point of the
+// triangle at the mean (s, q) but that point raised to the surface that the normals tell of [Hanika2021]: it
+// is projected up onto the tangent plane of each vertex of the face above it, and the four are blended with
+// the bilinear weights. It is raised by at most kMostRaise times the mean diagonal of the face, which bounds
+// what faces whose normals do not go with their shape can do.
 #pragma once
 
 #include <array>
@@ -39,9 +46,18 @@ inline constexpr double kBilinearRadiusTexels = 0.8;
 inline constexpr double kMipBias = 0.5;
 inline constexpr double kMipAnisotropy = 2.0;
 
+// Smooth surfaces whose normals turn by half a right angle from vertex to vertex are raised by less.
+inline constexpr double kMostRaise = 0.1;
+
 inline constexpr int kLeastPreviewSide = 16;
 inline constexpr int kMostPreviewSide = 8192;
-inline constexpr size_t kMostPreviewLights = 64;
+inline constexpr double kLeastFieldOfViewDeg = 0.1;
+inline constexpr double kMostFieldOfViewDeg = 170.0;
+inline constexpr double kLeastOrbitDistance = 0.01;
+inline constexpr double kMostOrbitDistance = 1000.0;
+inline constexpr size_t kMostPreviewLights = 4096;
+inline constexpr int kLeastShadowMap = 64;
+inline constexpr int kMostShadowMap = 2048;
 
 // Errors: INVALID_ARGUMENT naming the member of `scene`, its value and the limit.
 [[nodiscard]] absl::Status CheckScene(const PreviewScene& scene);

@@ -4,6 +4,7 @@
 #include <absl/strings/str_format.h>
 
 #include "btf/render/preview_scene.h"
+#include "btf/render/shadow_views.h"
 #include "btf/render/surface.h"
 
 namespace tessera {
@@ -46,6 +47,19 @@ constexpr char kEmptySampleFragment[] = R"(#version 450 core
 out uvec4 surface_sample;
 void main() {
   surface_sample = uvec4(0u);
+}
+)";
+
+constexpr char kShadowVertex[] = R"(#version 450 core
+layout(location = 0) in vec3 position;
+uniform mat4 clip_from_surface;
+void main() {
+  gl_Position = clip_from_surface * vec4(position, 1.0);
+}
+)";
+
+constexpr char kShadowFragment[] = R"(#version 450 core
+void main() {
 }
 )";
 
@@ -235,6 +249,58 @@ vec3 Filtered(int face, ivec4 links, vec2 st, int members, mat4x2 samples, vec3 
 }
 )";
 
+constexpr char kNoShadows[] = R"(
+float Visibility(int face, vec2 st, vec3 n) {
+  return 1.0;
+}
+)";
+
+// The share of the light that reaches a point of a face, whose shading normal is n.
+constexpr char kShadows[] = R"(
+uniform sampler2DArrayShadow shadow_maps;
+uniform mat4 shadow_clip[6];
+uniform int shadow_first_layer;
+uniform bool shadow_has_cube;
+uniform float shadow_texel_width;  // where w is 1
+uniform int cells;
+
+// The point of the triangle at st, raised to the surface that the normals tell of.
+vec3 Receiver(int face, vec2 st) {
+  vec3 p0 = texelFetch(face_corners, 8 * face).xyz, p1 = texelFetch(face_corners, 8 * face + 1).xyz;
+  vec3 p2 = texelFetch(face_corners, 8 * face + 2).xyz, p3 = texelFetch(face_corners, 8 * face + 3).xyz;
+  vec3 n0 = texelFetch(face_corners, 8 * face + 4).xyz, n1 = texelFetch(face_corners, 8 * face + 5).xyz;
+  vec3 n2 = texelFetch(face_corners, 8 * face + 6).xyz, n3 = texelFetch(face_corners, 8 * face + 7).xyz;
+  // A bilinear cell and its two triangles differ by the cell's twist.
+  vec2 at = st * float(cells);
+  vec2 f = at - min(floor(at), float(cells - 1));
+  vec3 twist = (p0 - p1 + p2 - p3) / float(cells * cells);
+  vec3 p = Bilinear(p0, p1, p2, p3, st) + min(f.x, f.y) * (1.0 - max(f.x, f.y)) * twist;
+  vec3 raise = Bilinear(max(dot(p0 - p, n0), 0.0) * n0, max(dot(p1 - p, n1), 0.0) * n1,
+                        max(dot(p2 - p, n2), 0.0) * n2, max(dot(p3 - p, n3), 0.0) * n3, st);
+  float most = kMostRaise * 0.5 * (length(p2 - p0) + length(p3 - p1));
+  return p + raise * min(1.0, most / max(length(raise), 1e-20));
+}
+
+// Of the maps about a light, the one that looks towards v.
+int CubeSide(vec3 v) {
+  vec3 a = abs(v);
+  if (a.x >= a.y && a.x >= a.z) return v.x >= 0.0 ? 0 : 1;
+  if (a.y >= a.z) return v.y >= 0.0 ? 2 : 3;
+  return v.z >= 0.0 ? 4 : 5;
+}
+
+float Visibility(int face, vec2 st, vec3 n) {
+  vec3 p = Receiver(face, st);
+  int side = shadow_has_cube ? CubeSide(p - light.xyz) : 0;
+  float w = (shadow_clip[side] * vec4(p, 1.0)).w;
+  p += kShadowBiasTexels * shadow_texel_width * w * n;
+  side = shadow_has_cube ? CubeSide(p - light.xyz) : 0;
+  vec4 clip = shadow_clip[side] * vec4(p, 1.0);
+  vec3 at = 0.5 * clip.xyz / clip.w + 0.5;
+  return texture(shadow_maps, vec4(at.xy, float(shadow_first_layer + side), at.z));
+}
+)";
+
 constexpr char kShadeTail[] = R"(
 
 // Value times irradiance / pi at a point of the front of a face. members: how many of `samples` to read as
@@ -278,7 +344,7 @@ vec3 Shade(int face, vec2 st, int members, mat4x2 samples) {
 
   vec3 value = Filtered(face, links, st, members, samples, position, mix(p1 - p0, p2 - p3, st.y),
                         mix(p3 - p0, p2 - p1, st.x), local_light, local_view);
-  return max(value, vec3(0.0)) * irradiance_by_pi * falloff;
+  return max(value, vec3(0.0)) * irradiance_by_pi * falloff * Visibility(face, st, n);
 }
 
 void main() {
@@ -342,19 +408,30 @@ std::string EmptySampleFragmentShader() {
   return kEmptySampleFragment;
 }
 
-std::string ShadeFragmentShader(const std::string& codec_source, Filter filter, bool has_mips) {
+std::string ShadowVertexShader() {
+  return kShadowVertex;
+}
+std::string ShadowFragmentShader() {
+  return kShadowFragment;
+}
+
+std::string ShadeFragmentShader(const std::string& codec_source, const ShadeVariant& variant) {
   static_assert(kSamplesPerPixel == 4, "the shader unpacks four samples");
-  const bool is_nearest = filter == Filter::kNearest;
+  static_assert(kMostMapsPerLight == 6, "the shader has room for six matrices");
+  const bool is_nearest = variant.filter == Filter::kNearest;
   return absl::StrCat("#version 450 core\n",
                       absl::StrFormat("const float kLeastViewCosine = %.9e;\n", kLeastViewCosine),
                       absl::StrFormat("const float kNearestShiftTexels = %.9e;\n", kNearestShiftTexels),
                       absl::StrFormat("const float kBilinearRadiusTexels = %.9e;\n", kBilinearRadiusTexels),
                       absl::StrFormat("const float kMipBias = %.9e;\n", kMipBias),
                       absl::StrFormat("const float kMipAnisotropy = %.9e;\n", kMipAnisotropy),
+                      absl::StrFormat("const float kMostRaise = %.9e;\n", kMostRaise),
+                      absl::StrFormat("const float kShadowBiasTexels = %.9e;\n", kShadowBiasTexels),
                       "const int kMostLevels = ", kMostMipLevels + 1, ";\n",
                       "const bool kNearest = ", is_nearest ? "true" : "false", ";\n",
-                      "const bool kHasMips = ", has_mips ? "true" : "false", ";\n", codec_source, kShadeHead,
-                      has_mips && !is_nearest ? kFilterMips : kFilterTexels, kShadeTail);
+                      "const bool kHasMips = ", variant.has_mips ? "true" : "false", ";\n", codec_source,
+                      kShadeHead, variant.has_mips && !is_nearest ? kFilterMips : kFilterTexels,
+                      variant.has_shadows ? kShadows : kNoShadows, kShadeTail);
 }
 
 }  // namespace tessera

@@ -16,7 +16,16 @@ namespace tessera {
 [[nodiscard]] std::string FrameVertexShader();
 // Nothing; drawn over the whole frame.
 [[nodiscard]] std::string EmptySampleFragmentShader();
-// `codec_source` is CodecGlsl::source; `has_mips`: mip levels stand behind the tile set's texels.
-[[nodiscard]] std::string ShadeFragmentShader(const std::string& codec_source, Filter filter, bool has_mips);
+// Depth alone, from a light.
+[[nodiscard]] std::string ShadowVertexShader();
+[[nodiscard]] std::string ShadowFragmentShader();
+
+struct ShadeVariant {
+  Filter filter = Filter::kBilinear;
+  bool has_mips = false;  // levels stand behind the tile set's texels
+  bool has_shadows = false;
+};
+// `codec_source` is CodecGlsl::source.
+[[nodiscard]] std::string ShadeFragmentShader(const std::string& codec_source, const ShadeVariant& variant);
 
 }  // namespace tessera

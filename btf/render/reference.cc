@@ -1,5 +1,5 @@
 // The picture of preview.h in double precision: triangles tested sample by sample, frames and taps of
-// surface.h, the decoder of codec/decoder.h. Shares no arithmetic with the shaders.
+// surface.h, the decoder of codec/decoder.h, rays to the lights. Shares no arithmetic with the shaders.
 #include "btf/render/reference.h"
 
 #include <algorithm>
@@ -7,6 +7,7 @@
 #include <cmath>
 #include <limits>
 #include <memory>
+#include <optional>
 #include <span>
 #include <utility>
 #include <vector>
@@ -16,6 +17,7 @@
 
 #include "btf/base/parallel.h"
 #include "btf/base/status_macros.h"
+#include "btf/render/occlusion.h"
 #include "btf/render/preview_scene.h"
 #include "btf/render/surface.h"
 
@@ -124,14 +126,83 @@ void DrawTriangle(const SurfaceTriangles& triangles, size_t first_index, const R
   }
 }
 
+// Where rays to lights start, above the receiver along its normal, in radii of the surface: far beyond what
+// single precision rounds away.
+constexpr double kRayOffset = 1e-5;
+
+// Which lights reach a point.
+class Visibility {
+ public:
+  Visibility(const PreviewScene& scene, const SurfaceTriangles& triangles, const Occlusion& occlusion)
+      : mesh_(scene.dressing->mesh), triangles_(triangles), occlusion_(occlusion) {}
+
+  // `n`: the shading normal at the point.
+  [[nodiscard]] bool Reaches(const Light& light, const SurfacePoint& point, const Eigen::Vector3d& n) const {
+    const Eigen::Vector3d origin = Receiver(point) + kRayOffset * triangles_.radius * n;
+    if (light.kind == Light::Kind::kDirectional) {
+      return !occlusion_.Occludes(origin, light.place.normalized(), std::numeric_limits<double>::infinity());
+    }
+    const Eigen::Vector3d to_light = light.place - triangles_.centre - origin;
+    const double distance = to_light.norm();
+    return distance == 0.0 || !occlusion_.Occludes(origin, to_light / distance, distance);
+  }
+
+ private:
+  // Relative to the surface's centre; see preview_scene.h.
+  [[nodiscard]] Eigen::Vector3d Receiver(const SurfacePoint& point) const {
+    const Eigen::Vector3d flat = OnTriangle(point);
+    const std::array<double, 4> weights = {(1.0 - point.s) * (1.0 - point.q), point.s * (1.0 - point.q),
+                                           point.s * point.q, (1.0 - point.s) * point.q};
+    Eigen::Vector3d raise = Eigen::Vector3d::Zero();
+    for (int k = 0; k < 4; ++k) {
+      const Eigen::Vector3d normal = mesh_.normals[mesh_.quads[point.face][k]].cast<double>();
+      raise += weights[k] * std::max((Corner(point.face, k) - flat).dot(normal), 0.0) * normal;
+    }
+    const double diagonal = 0.5 * ((Corner(point.face, 2) - Corner(point.face, 0)).norm() +
+                                   (Corner(point.face, 3) - Corner(point.face, 1)).norm());
+    return flat + raise * std::min(1.0, kMostRaise * diagonal / std::max(raise.norm(), 1e-20));
+  }
+
+  [[nodiscard]] Eigen::Vector3d Corner(int face, int k) const {
+    return mesh_.positions[mesh_.quads[face][k]].cast<double>() - triangles_.centre;
+  }
+
+  // The point (s, q) of the face's triangles.
+  [[nodiscard]] Eigen::Vector3d OnTriangle(const SurfacePoint& point) const {
+    const int n = triangles_.cells;
+    const int i = std::min(static_cast<int>(point.s * n), n - 1);
+    const int j = std::min(static_cast<int>(point.q * n), n - 1);
+    const double x = point.s * n - i;
+    const double y = point.q * n - j;
+    const size_t first = static_cast<size_t>(point.face) * (n + 1) * (n + 1);
+    const auto vertex = [&](int di, int dj) -> Eigen::Vector3d {
+      return triangles_.vertices[first + static_cast<size_t>(j + dj) * (n + 1) + i + di]
+          .position.cast<double>();
+    };
+    return x > y ? (1.0 - x) * vertex(0, 0) + (x - y) * vertex(1, 0) + y * vertex(1, 1)
+                 : (1.0 - y) * vertex(0, 0) + (y - x) * vertex(0, 1) + x * vertex(1, 1);
+  }
+
+  const QuadMesh& mesh_;
+  const SurfaceTriangles& triangles_;
+  const Occlusion& occlusion_;
+};
+
+// What the lights add up to, and which of the first 64 reach the point.
+struct Shaded {
+  Eigen::Array3d radiance = Eigen::Array3d::Zero();
+  uint64_t lit = 0;
+};
+
 class Shader {
  public:
+  // `visibility` is none where the scene has no shadows.
   Shader(const PreviewScene& scene, const DressedSurface& surface, const Decoder& decoder,
-         const ViewFrame& view)
-      : scene_(scene), surface_(surface), decoder_(decoder), view_(view) {}
+         const ViewFrame& view, const Visibility* visibility)
+      : scene_(scene), surface_(surface), decoder_(decoder), view_(view), visibility_(visibility) {}
 
-  // Mean radiance of one group's samples, all on the front of one face.
-  [[nodiscard]] Eigen::Array3d Radiance(std::span<const SurfacePoint> samples) const {
+  // Of one group's samples, all on the front of one face.
+  [[nodiscard]] Shaded Shade(std::span<const SurfacePoint> samples) const {
     SurfacePoint mean{samples[0].face, 0.0, 0.0};
     for (const SurfacePoint& sample : samples) {
       mean.s += sample.s / static_cast<double>(samples.size());
@@ -157,18 +228,23 @@ class Shader {
     }
     const SurfaceFrame frame = surface_.FrameAt(mean);
     const Eigen::Vector3d to_eye = (scene_.camera.eye - frame.position).normalized();
-    Eigen::Array3d sum = Eigen::Array3d::Zero();
-    for (const Light& light : scene_.lights) {
+    Shaded shaded;
+    for (size_t i = 0; i < scene_.lights.size(); ++i) {
+      const Light& light = scene_.lights[i];
+      if (visibility_ != nullptr && !visibility_->Reaches(light, mean, frame.n)) {
+        continue;
+      }
+      shaded.lit |= i < 64 ? uint64_t{1} << i : 0;
       Eigen::Vector3d to_light = light.place;
       double falloff = 1.0;
       if (light.kind == Light::Kind::kPoint) {
         to_light -= frame.position;
         falloff = 1.0 / std::max(to_light.squaredNorm(), 1e-24);
       }
-      sum += ReflectanceOfTaps(surface_, decoder_, frame, taps, to_light.normalized(), to_eye) *
-             light.irradiance.array() * (falloff / kPi);
+      shaded.radiance += ReflectanceOfTaps(surface_, decoder_, frame, taps, to_light.normalized(), to_eye) *
+                         light.irradiance.array() * (falloff / kPi);
     }
-    return sum;
+    return shaded;
   }
 
  private:
@@ -197,7 +273,44 @@ class Shader {
   const DressedSurface& surface_;
   const Decoder& decoder_;
   const ViewFrame& view_;
+  const Visibility* visibility_;
 };
+
+// One pixel from its samples.
+void ShadePixel(const Shader& shader, std::span<const Hit> samples, size_t pixel, ReferencePicture& picture) {
+  Eigen::Array3d sum = Eigen::Array3d::Zero();
+  int covered = 0;
+  picture.nearest[pixel] = std::numeric_limits<double>::infinity();
+  picture.lit_everywhere[pixel] = ~uint64_t{0};
+  std::array<bool, kSamplesPerPixel> done = {};
+  for (int i = 0; i < kSamplesPerPixel; ++i) {
+    picture.nearest[pixel] = std::min(picture.nearest[pixel], samples[i].depth);
+    picture.farthest[pixel] = std::max(picture.farthest[pixel], samples[i].depth);
+    if (done[i] || !std::isfinite(samples[i].depth)) {
+      continue;
+    }
+    std::vector<SurfacePoint> group;
+    for (int j = i; j < kSamplesPerPixel; ++j) {
+      if (!done[j] && std::isfinite(samples[j].depth) && samples[j].point.face == samples[i].point.face &&
+          samples[j].front == samples[i].front) {
+        group.push_back(samples[j].point);
+        done[j] = true;
+      }
+    }
+    covered += static_cast<int>(group.size());
+    if (samples[i].front) {
+      const Shaded shaded = shader.Shade(group);
+      sum += static_cast<double>(group.size()) * shaded.radiance;
+      picture.lit_somewhere[pixel] |= shaded.lit;
+      picture.lit_everywhere[pixel] &= shaded.lit;
+    }
+  }
+  float* out = picture.image.pixels.data() + pixel * 4;
+  for (int c = 0; c < 3 && covered > 0; ++c) {
+    out[c] = static_cast<float>(sum[c] / covered);
+  }
+  out[3] = static_cast<float>(covered) / kSamplesPerPixel;
+}
 
 }  // namespace
 
@@ -210,12 +323,20 @@ absl::StatusOr<ReferencePicture> RenderReferenceWithDepth(const PreviewScene& sc
   const SurfaceTriangles triangles = TriangulateSurface(scene.dressing->mesh);
   const ViewFrame view = MakeViewFrame(scene.camera, triangles);
   const Rays rays(view, triangles.centre, scene.width, scene.height);
-  const Shader shader(scene, surface, *decoder, view);
+  std::unique_ptr<Occlusion> occlusion;
+  std::optional<Visibility> visibility;
+  if (scene.shadows.has_value()) {
+    TESSERA_ASSIGN_OR_RETURN(occlusion, Occlusion::Create(triangles));
+    visibility.emplace(scene, triangles, *occlusion);
+  }
+  const Shader shader(scene, surface, *decoder, view, visibility.has_value() ? &*visibility : nullptr);
 
   ReferencePicture picture;
   picture.image = Image(scene.width, scene.height, 4);
   picture.nearest.assign(static_cast<size_t>(scene.width) * scene.height, 0.0);
   picture.farthest = picture.nearest;
+  picture.lit_somewhere.assign(picture.nearest.size(), 0);
+  picture.lit_everywhere = picture.lit_somewhere;
   std::vector<Hit> hits(picture.nearest.size() * kSamplesPerPixel);
   constexpr int kRowsPerTask = 8;
   ParallelFor(context, 0, scene.height, kRowsPerTask, [&](int64_t begin, int64_t end) {
@@ -225,34 +346,7 @@ absl::StatusOr<ReferencePicture> RenderReferenceWithDepth(const PreviewScene& sc
     }
     for (int64_t pixel = begin * scene.width; pixel < end * scene.width; ++pixel) {
       const std::span<const Hit> samples(hits.data() + pixel * kSamplesPerPixel, kSamplesPerPixel);
-      Eigen::Array3d sum = Eigen::Array3d::Zero();
-      int covered = 0;
-      picture.nearest[pixel] = std::numeric_limits<double>::infinity();
-      std::array<bool, kSamplesPerPixel> done = {};
-      for (int i = 0; i < kSamplesPerPixel; ++i) {
-        picture.nearest[pixel] = std::min(picture.nearest[pixel], samples[i].depth);
-        picture.farthest[pixel] = std::max(picture.farthest[pixel], samples[i].depth);
-        if (done[i] || !std::isfinite(samples[i].depth)) {
-          continue;
-        }
-        std::vector<SurfacePoint> group;
-        for (int j = i; j < kSamplesPerPixel; ++j) {
-          if (!done[j] && std::isfinite(samples[j].depth) && samples[j].point.face == samples[i].point.face &&
-              samples[j].front == samples[i].front) {
-            group.push_back(samples[j].point);
-            done[j] = true;
-          }
-        }
-        covered += static_cast<int>(group.size());
-        if (samples[i].front) {
-          sum += static_cast<double>(group.size()) * shader.Radiance(group);
-        }
-      }
-      float* out = picture.image.pixels.data() + pixel * 4;
-      for (int c = 0; c < 3 && covered > 0; ++c) {
-        out[c] = static_cast<float>(sum[c] / covered);
-      }
-      out[3] = static_cast<float>(covered) / kSamplesPerPixel;
+      ShadePixel(shader, samples, static_cast<size_t>(pixel), picture);
     }
   });
   TESSERA_RETURN_IF_ERROR(context.CheckStop());

@@ -1,6 +1,7 @@
 // The double-precision picture with what tests need beside it.
 #pragma once
 
+#include <cstdint>
 #include <vector>
 
 #include <absl/status/statusor.h>
@@ -15,6 +16,10 @@ struct ReferencePicture {
   // where a sample sees nothing. Silhouettes are where these jump.
   std::vector<double> nearest;
   std::vector<double> farthest;
+  // [height][width], bit i: light i < 64 reaches some group, or every group, of the pixel. Edges of shadows
+  // are where these change, or differ.
+  std::vector<uint64_t> lit_somewhere;
+  std::vector<uint64_t> lit_everywhere;
 };
 
 // Errors as RenderReference.

@@ -28,7 +28,7 @@ inline void ExpectPreviewsAsTheReferenceDoes(BtfelTable table) {
     const auto reference = RenderReferenceWithDepth(scene, {});
     ASSERT_TRUE(reference.ok()) << reference.status();
     const Comparison comparison = CompareAwayFromSilhouettes(*image, *reference);
-    EXPECT_LT(comparison.rmse, 1.0 / 255.0);
+    EXPECT_LT(comparison.rmse, 0.5 / 255.0);
     EXPECT_LT(comparison.differing, 0.01);
     EXPECT_GT(comparison.pixels, static_cast<size_t>(scene.width) * scene.height / 20);
   };

@@ -178,8 +178,25 @@ struct Comparison {
   size_t pixels = 0;       // compared
 };
 
-// Over pixels whose neighbourhood of 3 x 3 is wholly covered without a jump in depth.
-inline Comparison CompareAwayFromSilhouettes(const Image& image, const ReferencePicture& reference) {
+// Whether the same lights reach all that is seen within `margin` pixels.
+inline bool IsAwayFromShadows(const ReferencePicture& reference, int x, int y, int margin) {
+  const int width = reference.image.width;
+  const uint64_t lit = reference.lit_somewhere[static_cast<size_t>(y) * width + x];
+  for (int j = std::max(y - margin, 0); j <= std::min(y + margin, reference.image.height - 1); ++j) {
+    for (int i = std::max(x - margin, 0); i <= std::min(x + margin, width - 1); ++i) {
+      const size_t pixel = static_cast<size_t>(j) * width + i;
+      if (reference.lit_somewhere[pixel] != lit || reference.lit_everywhere[pixel] != lit) {
+        return false;
+      }
+    }
+  }
+  return true;
+}
+
+// Over pixels whose neighbourhood of 3 x 3 is wholly covered without a jump in depth, and that no edge of a
+// shadow comes nearer to than `shadow_margin` pixels.
+inline Comparison CompareAwayFromSilhouettes(const Image& image, const ReferencePicture& reference,
+                                             int shadow_margin = 0) {
   Comparison result;
   double squares = 0.0;
   const int width = image.width;
@@ -196,6 +213,9 @@ inline Comparison CompareAwayFromSilhouettes(const Image& image, const Reference
       }
       // A surface seen at 80 degrees from a few sizes away changes its depth by less over three pixels.
       if (!std::isfinite(farthest) || farthest - nearest > 0.06 * nearest) {
+        continue;
+      }
+      if (shadow_margin > 0 && !IsAwayFromShadows(reference, x, y, shadow_margin)) {
         continue;
       }
       ++result.pixels;

@@ -10,7 +10,6 @@
 #include <gtest/gtest.h>
 #include <Eigen/Geometry>
 
-#include "btf/render/composite.h"
 #include "btf/render/offscreen_context.h"
 #include "btf/render/reference.h"
 #include "btf/wang/dress.h"
@@ -30,7 +29,7 @@ using testing::RandomTileSet;
 using testing::SkewedGrid;
 using testing::WhiteDiffuser;
 
-constexpr double kRmseLimit = 1.0 / 255.0;
+constexpr double kRmseLimit = 0.5 / 255.0;
 // Samples within rounding of an edge of two faces, or of the limit between two filters, may fall either way.
 constexpr double kMostDiffering = 0.01;
 constexpr int kWidth = 160;
@@ -102,7 +101,7 @@ TEST_F(PreviewTest, GlMatchesTheReferenceOnTilesLaidTurnedAndShowsTurnedTiles) {
   ASSERT_TRUE(image.ok() && expected.ok()) << image.status() << expected.status();
   // Nearest taps break their ties along the columns and rows of the tile, so single texels may differ.
   const Comparison comparison = CompareAwayFromSilhouettes(*image, *expected);
-  EXPECT_LT(comparison.rmse, kRmseLimit) << "worst " << comparison.worst;
+  EXPECT_LT(comparison.rmse, 2.0 * kRmseLimit) << "worst " << comparison.worst;
 }
 
 TEST_F(PreviewTest, GlMatchesTheReferenceOnSkewedQuadsMagnifiedAndMinified) {
@@ -236,6 +235,21 @@ TEST_F(PreviewTest, AWhiteDiffuserReadsOneWhenLitAlongItsNormal) {
   const auto image = RenderGl(*context_, scene, run_);
   ASSERT_TRUE(image.ok());
   EXPECT_NEAR(image->at(32, 24)[1], 0.25f, 1e-3f);
+}
+
+// As an environment is shown: a list of directional lights.
+TEST_F(PreviewTest, AThousandLightsAddUp) {
+  const Dressing dressing = RandomDressing(SkewedGrid(2, 0.2, 1), 2);
+  const TileSet tile_set = RandomTileSet(RandomBtfels(9, 4, 4, 5), 16, 3);
+  PreviewScene scene{.dressing = &dressing, .tile_set = &tile_set, .width = 24, .height = 16};
+  scene.lights.clear();
+  for (int i = 0; i < 1000; ++i) {
+    scene.lights.push_back({.place = VectorFromDirection({1.5 * std::sqrt(i / 1000.0), 2.4 * i}),
+                            .irradiance = Eigen::Vector3d::Constant(kPi / 1000.0)});
+  }
+  ExpectAgreement(scene);
+  scene.lights.resize(4097);
+  EXPECT_THAT(std::string(RenderGl(*context_, scene, run_).status().message()), HasSubstr("4097 lights"));
 }
 
 TEST_F(PreviewTest, TheBackOfASurfaceIsBlackAndCovers) {
@@ -445,54 +459,6 @@ TEST_F(PreviewTest, RefusesBadScenesByName) {
   scene = good;
   scene.tile_set = &foreign;
   expect(scene, absl::StatusCode::kUnimplemented, "dfmf-x");
-}
-
-TEST(FramingCamera, ShowsEveryVertexInsideTheFrame) {
-  for (const std::string_view name : BuiltinShapeNames()) {
-    const auto mesh = BuiltinShape(name);
-    ASSERT_TRUE(mesh.ok());
-    const Camera camera = FramingCamera(*mesh, 200, 100);
-    const Eigen::Vector3d back = (camera.eye - camera.target).normalized();
-    const Eigen::Vector3d right = camera.up.cross(back).normalized();
-    const Eigen::Vector3d up = back.cross(right);
-    double largest = 0.0;
-    for (const Eigen::Vector3f& position : mesh->positions) {
-      const Eigen::Vector3d d = position.cast<double>() - camera.eye;
-      const double depth = -d.dot(back);
-      ASSERT_GT(depth, 0.0);
-      const double tan_y = std::tan(0.5 * camera.fov_y_rad);
-      largest = std::max(
-          {largest, std::abs(d.dot(up)) / (depth * tan_y), std::abs(d.dot(right)) / (depth * 2.0 * tan_y)});
-    }
-    EXPECT_LE(largest, 1.0) << name;
-    EXPECT_GT(largest, 0.8) << name;
-  }
-}
-
-TEST(TexelsPerPixel, IsTheTexelsAlongAPixelOfAFacingPlane) {
-  // Two units wide, of 4 x 4 tiles of 16 texels.
-  const Dressing dressing = RandomDressing(SkewedGrid(4, 0.0, 1), 2);
-  const TileSet tile_set = RandomTileSet(WhiteDiffuser(), 16, 3);
-  PreviewScene scene{.dressing = &dressing, .tile_set = &tile_set, .width = kWidth, .height = kHeight};
-  for (const double distance : {1.0, 3.0, 40.0}) {
-    scene.camera.eye = {0.0, 0.0, distance};
-    const double units_per_pixel = 2.0 * distance * std::tan(0.5 * scene.camera.fov_y_rad) / kHeight;
-    EXPECT_NEAR(TexelsPerPixel(scene) / (32.0 * units_per_pixel), 1.0, 1e-5);
-    scene.camera.eye.z() = -distance;
-    EXPECT_EQ(TexelsPerPixel(scene), 0.0);
-  }
-}
-
-TEST(CompositeOver, BlendsByCoverage) {
-  Image picture(2, 1, 4);
-  const std::vector<float> pixels = {1.0f, 0.5f, 0.0f, 0.25f, 9.0f, 9.0f, 9.0f, 0.0f};
-  picture.pixels = pixels;
-  const Background grey{{0.2f, 0.2f, 0.2f}, {0.2f, 0.2f, 0.2f}};
-  const auto result = CompositeOver(picture, grey);
-  ASSERT_TRUE(result.ok());
-  EXPECT_FLOAT_EQ(result->at(0, 0)[0], 0.25f + 0.75f * 0.2f);
-  EXPECT_FLOAT_EQ(result->at(1, 0)[2], 0.2f);
-  EXPECT_EQ(CompositeOver(*result, grey).status().code(), absl::StatusCode::kInvalidArgument);
 }
 
 }  // namespace
