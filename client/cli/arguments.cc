@@ -1,5 +1,6 @@
 #include "client/cli/arguments.h"
 
+#include <algorithm>
 #include <charconv>
 #include <cmath>
 #include <filesystem>
@@ -75,15 +76,19 @@ absl::StatusOr<Direction> ParseDirection(std::string_view text) {
 
 absl::StatusOr<v1::Light> ParseLight(std::string_view text) {
   constexpr std::string_view kPoint = "point:";
-  constexpr std::string_view kForm = "TH,PH[,SCALE] in degrees or point:X,Y,Z[,SCALE], SCALE above 0";
+  constexpr std::string_view kForm =
+      "TH,PH[,SCALE] in degrees or point:X,Y,Z[,SCALE], SCALE above 0 or three for red, green, blue";
   const bool is_point = text.starts_with(kPoint);
   const auto numbers = ParseNumbers(is_point ? text.substr(kPoint.size()) : text);
   const size_t num_place = is_point ? 3 : 2;
-  if (!numbers || numbers->size() < num_place || numbers->size() > num_place + 1) {
+  if (!numbers || numbers->size() < num_place) {
     return Misread("light", text, kForm);
   }
-  const double scale = numbers->size() > num_place ? numbers->back() : 1.0;
-  if (scale <= 0) {
+  std::vector<double> scales(numbers->begin() + static_cast<ptrdiff_t>(num_place), numbers->end());
+  if (scales.size() <= 1) {
+    scales.assign(3, scales.empty() ? 1.0 : scales[0]);
+  }
+  if (scales.size() != 3 || *std::ranges::min_element(scales) < 0 || *std::ranges::max_element(scales) <= 0) {
     return Misread("light", text, kForm);
   }
   v1::Light light;
@@ -101,10 +106,31 @@ absl::StatusOr<v1::Light> ParseLight(std::string_view text) {
     light.set_y(std::sin(theta) * std::sin(phi));
     light.set_z(std::cos(theta));
   }
-  light.set_red(scale * kPi);
-  light.set_green(scale * kPi);
-  light.set_blue(scale * kPi);
+  light.set_red(scales[0] * kPi);
+  light.set_green(scales[1] * kPi);
+  light.set_blue(scales[2] * kPi);
   return light;
+}
+
+absl::StatusOr<std::array<double, 3>> ParsePlace(std::string_view what, std::string_view text) {
+  const auto numbers = ParseNumbers(text);
+  if (!numbers || numbers->size() != 3) {
+    return Misread(what, text, "X,Y,Z");
+  }
+  return std::array<double, 3>{(*numbers)[0], (*numbers)[1], (*numbers)[2]};
+}
+
+absl::StatusOr<v1::Orbit> ParseOrbit(std::string_view text) {
+  const auto numbers = ParseNumbers(text);
+  if (!numbers || numbers->size() < 2 || numbers->size() > 3 ||
+      (numbers->size() == 3 && (*numbers)[2] <= 0)) {
+    return Misread("orbit", text, "AZ,EL[,DISTANCE], degrees and a factor above 0");
+  }
+  v1::Orbit orbit;
+  orbit.set_azimuth_deg((*numbers)[0]);
+  orbit.set_elevation_deg((*numbers)[1]);
+  orbit.set_distance(numbers->size() == 3 ? (*numbers)[2] : 1.0);
+  return orbit;
 }
 
 absl::StatusOr<PictureFormat> PictureFormatOf(std::string_view path) {

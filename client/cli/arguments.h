@@ -1,6 +1,7 @@
 // The small languages of the command line: "640x480", "45,135", "point:0,1,3".
 #pragma once
 
+#include <array>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -26,9 +27,15 @@ struct PictureSize {
 [[nodiscard]] absl::StatusOr<Direction> ParseDirection(std::string_view text);
 
 // "TH,PH[,S]": from that direction, polar from the +z axis (towards the viewer of an unturned scene), azimuth
-// from +x towards +y; irradiance S pi, S = 1 when left out. "point:X,Y,Z[,S]": a point light there,
-// irradiance S pi at distance 1.
+// from +x towards +y; irradiance S pi, S = 1 when left out; "TH,PH,R,G,B" for a coloured one.
+// "point:X,Y,Z[,S]" or "point:X,Y,Z,R,G,B": a point light there, irradiance S pi at distance 1.
 [[nodiscard]] absl::StatusOr<v1::Light> ParseLight(std::string_view text);
+
+// "X,Y,Z". `what` names it in the error.
+[[nodiscard]] absl::StatusOr<std::array<double, 3>> ParsePlace(std::string_view what, std::string_view text);
+
+// "AZ,EL[,DISTANCE]", degrees and a factor above 0; legal ranges are the server's.
+[[nodiscard]] absl::StatusOr<v1::Orbit> ParseOrbit(std::string_view text);
 
 enum class PictureFormat { kPng, kExr };
 // By the ending of an output path, .png or .exr.

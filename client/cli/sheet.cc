@@ -13,6 +13,7 @@ namespace {
 
 struct SheetFlags {
   std::vector<std::string> pictures;
+  std::vector<std::string> captions;
   int columns = 0;
   std::string output;
 };
@@ -23,7 +24,7 @@ absl::Status RunSheet(Session& session, const SheetFlags& flags) {
   for (const std::string& path : flags.pictures) {
     TESSERA_ASSIGN_OR_RETURN(pictures.emplace_back(), ReadImage(path, std::nullopt));
   }
-  TESSERA_ASSIGN_OR_RETURN(const Image sheet, ContactSheet(pictures, flags.columns));
+  TESSERA_ASSIGN_OR_RETURN(const Image sheet, ContactSheet(pictures, flags.columns, flags.captions));
   TESSERA_ASSIGN_OR_RETURN(const std::string bytes,
                            format == PictureFormat::kPng ? EncodePng(sheet) : EncodeExr(sheet));
   TESSERA_RETURN_IF_ERROR(WriteFileAtomically(flags.output, bytes));
@@ -39,6 +40,9 @@ void AddSheetCommand(CLI::App& app, Session& session) {
   command->add_option("PICTURE", flags->pictures, "PNG, JPEG or EXR files")->required();
   command->add_option("--columns", flags->columns, "Pictures a row [about square]")
       ->check(CLI::NonNegativeNumber);
+  command->add_option("--caption", flags->captions, "Below a picture; one for each, in their order")
+      ->expected(1)
+      ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
   command->add_option("-o,--output", flags->output, "File to write, .png (sRGB) or .exr (linear)")
       ->required();
   command->callback(

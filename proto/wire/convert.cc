@@ -197,6 +197,9 @@ Camera CameraFromMessage(const v1::Camera& message) {
   if (message.fov_y_deg() != 0) {
     camera.fov_y_rad = RadFromDeg(message.fov_y_deg());
   }
+  if (message.up_x() != 0 || message.up_y() != 0 || message.up_z() != 0) {
+    camera.up = {message.up_x(), message.up_y(), message.up_z()};
+  }
   return camera;
 }
 
@@ -209,7 +212,43 @@ v1::Camera MessageFromCamera(const Camera& camera) {
   message.set_target_y(camera.target.y());
   message.set_target_z(camera.target.z());
   message.set_fov_y_deg(DegFromRad(camera.fov_y_rad));
+  message.set_up_x(camera.up.x());
+  message.set_up_y(camera.up.y());
+  message.set_up_z(camera.up.z());
   return message;
+}
+
+Orbit OrbitFromMessage(const v1::Orbit& message) {
+  Orbit orbit{.azimuth_rad = RadFromDeg(message.azimuth_deg()),
+              .elevation_rad = RadFromDeg(message.elevation_deg())};
+  if (message.distance() != 0) {
+    orbit.distance = message.distance();
+  }
+  if (message.fov_y_deg() != 0) {
+    orbit.fov_y_rad = RadFromDeg(message.fov_y_deg());
+  }
+  return orbit;
+}
+
+absl::StatusOr<Tone> ToneFromMessage(const v1::Tone& message) {
+  Tone tone{.exposure_stops = message.exposure_stops()};
+  switch (message.curve()) {
+    case v1::Tone::NONE:
+      break;
+    case v1::Tone::REINHARD:
+      tone.curve = ToneCurve::kReinhard;
+      break;
+    case v1::Tone::FILMIC:
+      tone.curve = ToneCurve::kFilmic;
+      break;
+    default:
+      return absl::InvalidArgumentError(absl::StrCat("tone curve ", static_cast<int>(message.curve()),
+                                                     ", expected NONE, REINHARD or FILMIC"));
+  }
+  if (message.white() != 0) {
+    tone.white = message.white();
+  }
+  return tone;
 }
 
 }  // namespace tessera

@@ -8,6 +8,7 @@
 #include "btf/base/run_context.h"
 #include "btf/choice/encode_model.h"
 #include "btf/data/btf_source.h"
+#include "btf/image/tone_map.h"
 #include "btf/math/conventions.h"
 #include "btf/render/preview.h"
 #include "btf/wang/arrangement.h"
@@ -42,8 +43,12 @@ void FillDefaults(v1::EncodeOptions& message);
 // An irradiance of 0, 0, 0 means pi in each channel.
 [[nodiscard]] Light LightFromMessage(const v1::Light& message);
 [[nodiscard]] v1::Light MessageFromLight(const Light& light);
-// A field of view of 0 means 35 degrees.
+// A field of view of 0 means 35 degrees, up of 0, 0, 0 the y axis.
 [[nodiscard]] Camera CameraFromMessage(const v1::Camera& message);
 [[nodiscard]] v1::Camera MessageFromCamera(const Camera& camera);
+// A distance of 0 means 1, a field of view of 0 means 35 degrees.
+[[nodiscard]] Orbit OrbitFromMessage(const v1::Orbit& message);
+// A white of 0 means 4. Errors: INVALID_ARGUMENT (a curve that does not exist).
+[[nodiscard]] absl::StatusOr<Tone> ToneFromMessage(const v1::Tone& message);
 
 }  // namespace tessera

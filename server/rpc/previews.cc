@@ -4,13 +4,17 @@
 #include <chrono>
 #include <optional>
 #include <span>
+#include <utility>
 
 #include <absl/strings/str_cat.h>
 
 #include "btf/base/status_macros.h"
 #include "btf/image/image_io.h"
+#include "btf/image/tone_map.h"
 #include "btf/mips/tile_mips.h"
+#include "btf/render/composite.h"
 #include "btf/render/preview.h"
+#include "btf/render/preview_scene.h"
 #include "btf/wang/shapes.h"
 #include "btf/wang/tile_set.h"
 #include "proto/wire/convert.h"
@@ -61,6 +65,90 @@ absl::StatusOr<std::optional<TileMips>> MipsOf(v1::RenderPreviewRequest::Mips wa
   return is_refused ? WithReason(mips.status(), "ARGUMENT_INVALID", "mips") : mips.status();
 }
 
+absl::Status WithField(const absl::Status& status, std::string_view field) {
+  return absl::IsInvalidArgument(status) ? WithReason(status, "ARGUMENT_INVALID", field) : status;
+}
+
+// What becomes of the linear picture.
+struct Development {
+  Tone tone;
+  std::optional<Background> background;
+};
+
+absl::StatusOr<Development> DevelopmentOf(const v1::RenderPreviewRequest& request) {
+  const bool is_exr = request.format() == v1::RenderPreviewRequest::EXR;
+  Development development;
+  if (request.has_tone()) {
+    const absl::StatusOr<Tone> tone = ToneFromMessage(request.tone());
+    TESSERA_RETURN_IF_ERROR(WithField(tone.status(), "tone"));
+    TESSERA_RETURN_IF_ERROR(WithField(CheckTone(*tone), "tone"));
+    if (is_exr && *tone != Tone{}) {
+      return Refuse("exposure and tone are for PNG: an EXR stays linear", "tone");
+    }
+    development.tone = *tone;
+  }
+  if (!request.background().empty()) {
+    const absl::StatusOr<Background> background = ParseBackground(request.background());
+    TESSERA_RETURN_IF_ERROR(WithField(background.status(), "background"));
+    if (is_exr) {
+      return Refuse("a background is for PNG: an EXR keeps its coverage", "background");
+    }
+    development.background = *background;
+  }
+  return development;
+}
+
+absl::StatusOr<std::string> Encode(Image image, const Development& development) {
+  TESSERA_RETURN_IF_ERROR(ApplyTone(development.tone, image));
+  if (development.background.has_value()) {
+    TESSERA_ASSIGN_OR_RETURN(image, CompositeOver(image, *development.background));
+  }
+  return EncodePng(image);
+}
+
+absl::StatusOr<std::optional<ShadowParams>> ShadowsOf(const v1::RenderPreviewRequest& request) {
+  if (!request.shadows()) {
+    if (request.shadow_map_size() != 0) {
+      return Refuse("a shadow map size without shadows", "shadow_map_size");
+    }
+    return std::nullopt;
+  }
+  ShadowParams shadows;
+  if (request.shadow_map_size() != 0) {
+    const uint32_t size = request.shadow_map_size();
+    if (size < kLeastShadowMap || size > kMostShadowMap) {
+      return Refuse(
+          absl::StrCat("shadow map size ", size, ", expected ", kLeastShadowMap, " to ", kMostShadowMap),
+          "shadow_map_size");
+    }
+    shadows.map_size = static_cast<int>(size);
+  }
+  return shadows;
+}
+
+// The camera, and the lights turned with it.
+absl::Status SetCamera(const v1::RenderPreviewRequest& request, PreviewScene& scene) {
+  const QuadMesh& mesh = scene.dressing->mesh;
+  if (!request.has_orbit()) {
+    scene.camera = request.has_camera() ? CameraFromMessage(request.camera())
+                                        : FramingCamera(mesh, scene.width, scene.height);
+    return absl::OkStatus();
+  }
+  if (request.has_camera()) {
+    return Refuse("camera and orbit: expected at most one", "orbit");
+  }
+  const Orbit orbit = OrbitFromMessage(request.orbit());
+  absl::StatusOr<Camera> camera = OrbitCamera(mesh, orbit, scene.width, scene.height);
+  TESSERA_RETURN_IF_ERROR(WithField(camera.status(), "orbit"));
+  scene.camera = *std::move(camera);
+  if (request.orbit().turns_lights()) {
+    for (Light& light : scene.lights) {
+      light = LightTurnedAbout(light, scene.camera.target, orbit.azimuth_rad);
+    }
+  }
+  return absl::OkStatus();
+}
+
 }  // namespace
 
 absl::StatusOr<Dressing> PreviewsService::SurfaceOf(const v1::RenderPreviewRequest& request,
@@ -101,6 +189,8 @@ absl::StatusOr<std::string> PreviewsService::Render(const v1::RenderPreviewReque
   PreviewScene scene;
   TESSERA_ASSIGN_OR_RETURN(scene.width, SideOf(request.width(), 640, "width"));
   TESSERA_ASSIGN_OR_RETURN(scene.height, SideOf(request.height(), 480, "height"));
+  TESSERA_ASSIGN_OR_RETURN(const Development development, DevelopmentOf(request));
+  TESSERA_ASSIGN_OR_RETURN(scene.shadows, ShadowsOf(request));
   if (request.lights_size() > kMaxPreviewLights) {
     return Refuse(absl::StrCat(request.lights_size(), " lights, at most ", kMaxPreviewLights), "lights");
   }
@@ -127,8 +217,7 @@ absl::StatusOr<std::string> PreviewsService::Render(const v1::RenderPreviewReque
   TESSERA_ASSIGN_OR_RETURN(const TileSet tile_set, ParseTileSet(std::as_bytes(std::span(bytes))));
   scene.dressing = &dressing;
   scene.tile_set = &tile_set;
-  scene.camera = request.has_camera() ? CameraFromMessage(request.camera())
-                                      : FramingCamera(dressing.mesh, scene.width, scene.height);
+  TESSERA_RETURN_IF_ERROR(SetCamera(request, scene));
   TESSERA_ASSIGN_OR_RETURN(const std::optional<TileMips> mips, MipsOf(request.mips(), scene, context));
   scene.mips = mips.has_value() ? &*mips : nullptr;
 
@@ -139,9 +228,10 @@ absl::StatusOr<std::string> PreviewsService::Render(const v1::RenderPreviewReque
   if (context_ == nullptr) {
     TESSERA_ASSIGN_OR_RETURN(context_, CreateOsmesaContext());
   }
-  TESSERA_ASSIGN_OR_RETURN(const Image image, RenderGl(*context_, scene, context));
+  TESSERA_ASSIGN_OR_RETURN(Image image, RenderGl(*context_, scene, context));
   lock.unlock();
-  return request.format() == v1::RenderPreviewRequest::EXR ? EncodeExr(image) : EncodePng(image);
+  return request.format() == v1::RenderPreviewRequest::EXR ? EncodeExr(image)
+                                                           : Encode(std::move(image), development);
 }
 
 absl::Status PreviewsService::RenderPreview(const v1::RenderPreviewRequest& request,

@@ -406,6 +406,31 @@ class MainJobTest(harness.CommandTest):
         self.assertEqual(*((self.folder / f"mips-{mips}.png").read_bytes() for mips in ("on", "auto")))
         self.assert_fails(4, "preview", "surface-96/none", "--mesh", "builtin:torus", "-o", "none.png")
         self.assertFalse((self.folder / "none.png").exists())
+        # Light, camera and development of the picture.
+        plain = (self.folder / "mips-off.png").read_bytes()
+        for name, flags in {"shadows": ("--shadows", "--shadow-map", 256, "--light", "70,0", "--light", "point:0,1,1,1,.5,0"),
+                            "orbit": ("--orbit", "40,10,1.2"), "eye": ("--eye", "0,2,2", "--up", "0,0,-1", "--fov", 50),
+                            "tone": ("--exposure", 1, "--tone", "filmic"), "ground": ("--background", "203040")}.items():
+            self.run_ok(*small, "--mips", "off", *flags, "-o", f"{name}.png")
+            self.assertNotEqual((self.folder / f"{name}.png").read_bytes(), plain, name)
+        self.assert_fails(2, *small, "--eye", "0,0,3", "--orbit", "0,0", "-o", "none.png")
+        self.assert_fails(5, *small, "--orbit", "0,95", "-o", "none.png", says="elevation")
+        self.assert_fails(5, *small, "--tone", "filmic", "-o", "none.exr", says="EXR")
+        # Turntables and sheets.
+        frames = self.run_json(*small, "--turntable", 3, "-o", "turn.png")["files"]
+        self.assertEqual([f["file"] for f in frames], ["turn-000.png", "turn-001.png", "turn-002.png"])
+        self.assertEqual(len({(self.folder / f["file"]).read_bytes() for f in frames}), 3)
+        for name in ("turn.apng", "again.png"):
+            self.run_ok(*small, "--turntable", 3, "--animated", "--fps", 5, "-o", name)
+        animation = (self.folder / "turn.apng").read_bytes()
+        self.assertEqual(animation.count(b"fcTL"), 3)
+        self.assertEqual(animation, (self.folder / "again.png").read_bytes())
+        self.assertEqual(self.picture("again.png"), self.picture("turn-000.png"))
+        self.run_ok("preview", "surface-96/skin", "surface-96/leopard", "--mesh", "builtin:torus", "--mesh", "builtin:plane",
+                    "--size", "64x48", "--sheet", "-o", "table.png")
+        width, height, _ = self.picture("table.png")
+        self.assertEqual(width, 2 * 72 + 8)
+        self.assertGreater(height, 2 * 56 + 8)
         self.run_ok("sheet", "skin.png", "both-surface-96-leopard.png", "--columns", 2, "-o", "sheet.png")
         self.assertEqual(self.picture("sheet.png")[:2], (2 * 168 + 8, 128 + 8))
 

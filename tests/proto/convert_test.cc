@@ -121,12 +121,36 @@ TEST(ConvertTest, LightsAndCamerasComeBack) {
   EXPECT_EQ(back.irradiance, light.irradiance);
   EXPECT_EQ(LightFromMessage({}).irradiance, Eigen::Vector3d::Constant(kPi));
 
-  Camera camera{.eye = {1, 2, 3}, .target = {0, 1, 0}};
+  Camera camera{.eye = {1, 2, 3}, .target = {0, 1, 0}, .up = {0, 0, 2}};
   const Camera camera_back = CameraFromMessage(MessageFromCamera(camera));
   EXPECT_EQ(camera_back.eye, camera.eye);
   EXPECT_EQ(camera_back.target, camera.target);
+  EXPECT_EQ(camera_back.up, camera.up);
+  EXPECT_EQ(CameraFromMessage({}).up, Eigen::Vector3d::UnitY());
   EXPECT_NEAR(camera_back.fov_y_rad, camera.fov_y_rad, kRoundingDeg);
   EXPECT_NEAR(CameraFromMessage({}).fov_y_rad, RadFromDeg(35), kRoundingDeg);
+}
+
+TEST(ConvertTest, OrbitsAndTonesHaveDefaults) {
+  const Orbit orbit = OrbitFromMessage({});
+  EXPECT_EQ(orbit.azimuth_rad, 0);
+  EXPECT_EQ(orbit.elevation_rad, 0);
+  EXPECT_EQ(orbit.distance, 1);
+  EXPECT_NEAR(orbit.fov_y_rad, RadFromDeg(35), kRoundingDeg);
+  v1::Orbit message;
+  message.set_azimuth_deg(90);
+  message.set_distance(2);
+  EXPECT_NEAR(OrbitFromMessage(message).azimuth_rad, RadFromDeg(90), kRoundingDeg);
+  EXPECT_EQ(OrbitFromMessage(message).distance, 2);
+
+  EXPECT_EQ(*ToneFromMessage({}), Tone{});
+  v1::Tone tone;
+  tone.set_curve(v1::Tone::REINHARD);
+  tone.set_exposure_stops(-1);
+  tone.set_white(2);
+  EXPECT_EQ(*ToneFromMessage(tone), (Tone{.exposure_stops = -1, .curve = ToneCurve::kReinhard, .white = 2}));
+  tone.set_curve(static_cast<v1::Tone::Curve>(9));
+  EXPECT_EQ(ToneFromMessage(tone).status().code(), absl::StatusCode::kInvalidArgument);
 }
 
 }  // namespace

@@ -55,6 +55,31 @@ TEST(ArgumentsTest, LightsAtAPoint) {
   }
 }
 
+TEST(ArgumentsTest, LightsHaveColours) {
+  const auto light = ParseLight("0,0,1,0.5,0");
+  ASSERT_TRUE(light.ok()) << light.status();
+  EXPECT_NEAR(light->red(), kPi, 1e-12);
+  EXPECT_NEAR(light->green(), kPi / 2, 1e-12);
+  EXPECT_EQ(light->blue(), 0);
+  for (const char* bad : {"0,0,0,0,0", "0,0,1,-1,1", "point:0,0,0,1,1", "0,0,1,1,1,1"}) {
+    EXPECT_EQ(ExitCodeOf(ParseLight(bad).status()), kExitUsage) << bad;
+  }
+}
+
+TEST(ArgumentsTest, PlacesAndOrbits) {
+  EXPECT_EQ(ParsePlace("eye", "1,-2,3.5").value(), (std::array<double, 3>{1, -2, 3.5}));
+  EXPECT_EQ(ExitCodeOf(ParsePlace("eye", "1,2").status()), kExitUsage);
+  const auto orbit = ParseOrbit("30,-20,1.5");
+  ASSERT_TRUE(orbit.ok()) << orbit.status();
+  EXPECT_EQ(orbit->azimuth_deg(), 30);
+  EXPECT_EQ(orbit->elevation_deg(), -20);
+  EXPECT_EQ(orbit->distance(), 1.5);
+  EXPECT_EQ(ParseOrbit("30,-20")->distance(), 1.0);
+  for (const char* bad : {"30", "30,20,0", "30,20,-1", "a,20", "1,2,3,4"}) {
+    EXPECT_EQ(ExitCodeOf(ParseOrbit(bad).status()), kExitUsage) << bad;
+  }
+}
+
 TEST(ArgumentsTest, FormatsAndBuiltins) {
   EXPECT_EQ(PictureFormatOf("a/b.png").value(), PictureFormat::kPng);
   EXPECT_EQ(PictureFormatOf("b.exr").value(), PictureFormat::kExr);

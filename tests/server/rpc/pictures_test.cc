@@ -121,6 +121,46 @@ TEST_F(ServerTest, PicturesAreDrawn) {
   EXPECT_EQ(SubjectOf(render().status()), "mips");
   request.clear_mips();
 
+  // Settings of the picture: each changes it, and what is out of range is refused by its name.
+  request.set_format(v1::RenderPreviewRequest::EXR);
+  request.mutable_tone()->set_exposure_stops(1);
+  EXPECT_EQ(SubjectOf(render().status()), "tone");
+  request.clear_tone();
+  request.set_background("ffffff");
+  EXPECT_EQ(SubjectOf(render().status()), "background");
+  request.set_format(v1::RenderPreviewRequest::PNG);
+  EXPECT_NE(*render(), *png);
+  request.set_background("white");
+  EXPECT_EQ(SubjectOf(render().status()), "background");
+  request.clear_background();
+  request.mutable_tone()->set_exposure_stops(-1);
+  EXPECT_NE(*render(), *png);
+  request.mutable_tone()->set_exposure_stops(30);
+  EXPECT_EQ(SubjectOf(render().status()), "tone");
+  request.clear_tone();
+  request.set_shadow_map_size(256);
+  EXPECT_EQ(SubjectOf(render().status()), "shadow_map_size");
+  request.set_shadows(true);
+  EXPECT_TRUE(render().ok()) << render().status();
+  request.set_shadow_map_size(4096);
+  EXPECT_EQ(SubjectOf(render().status()), "shadow_map_size");
+  request.clear_shadows();
+  request.clear_shadow_map_size();
+  request.mutable_orbit()->set_azimuth_deg(90);
+  const auto aside = render();
+  ASSERT_TRUE(aside.ok()) << aside.status();
+  EXPECT_NE(*aside, *png);
+  request.mutable_orbit()->set_turns_lights(true);
+  EXPECT_NE(*render(), *aside);
+  request.mutable_orbit()->set_elevation_deg(91);
+  EXPECT_EQ(SubjectOf(render().status()), "orbit");
+  request.mutable_orbit()->set_elevation_deg(0);
+  request.mutable_camera()->set_eye_z(3);
+  EXPECT_EQ(SubjectOf(render().status()), "orbit");
+  request.clear_orbit();
+  EXPECT_TRUE(render().ok()) << render().status();
+  request.clear_camera();
+
   v1::DressMeshRequest dress;
   dress.set_arrangement("arrangements/plane-16");
   dress.set_builtin("plane");
