@@ -10,11 +10,11 @@ build_packages=(
   libopenexr-dev libpng-dev libjpeg62-turbo-dev libzip-dev zlib1g-dev libzstd-dev libssl-dev
   libeigen3-dev libtbb-dev libembree-dev libkissfft-dev
   libsqlite3-dev libspdlog-dev libcli11-dev nlohmann-json3-dev
-  libosmesa6-dev libglm-dev python3-glad
+  libosmesa6-dev libglm-dev python3-glad libglfw3-dev libimgui-dev
 )
 test_packages=(
   libgtest-dev libgmock-dev libboost-graph-dev
-  python3-grpcio python3-grpc-tools python3-numpy clang-format git
+  python3-grpcio python3-grpc-tools python3-numpy clang-format git xvfb xauth
 )
 
 packages=("${build_packages[@]}")
