@@ -62,7 +62,12 @@ void ViewerState::ApplySurface(LoadEvent event) {
 
 void ViewerState::ApplyList(LoadEvent event) {
   if (!event.status.ok()) {
-    Tell({true, TextOf("no list of tile sets", event.status), kListSubject});
+    std::string text = TextOf("no list of tile sets", event.status);
+    if (absl::IsUnavailable(event.status)) {
+      absl::StrAppend(&text, "; start one with: tessera-server --data DIR --listen ", options_.server,
+                      ", then Refresh");
+    }
+    Tell({true, std::move(text), kListSubject});
     return;
   }
   entries_ = std::move(event.entries);

@@ -118,7 +118,11 @@ class WindowDisplay final : public Display {
     TESSERA_ASSIGN_OR_RETURN(GlState* const state, gui_->gl_state());
     const auto* const renderer = reinterpret_cast<const char*>(state->gl.GetString(GL_RENDERER));
     if (renderer != nullptr && std::string_view(renderer).find("llvmpipe") != std::string_view::npos) {
-      return CreateOsmesaContext();
+      // OSMesa unbinds what is current, behind GLFW's back.
+      gui_->Release();
+      TESSERA_ASSIGN_OR_RETURN(auto osmesa, CreateOsmesaContext());
+      TESSERA_RETURN_IF_ERROR(gui_->MakeCurrent());
+      return osmesa;
     }
     return MakeGlfwContext(16, 16, title, false);
   }
