@@ -173,8 +173,8 @@ void App::AskForPicture() {
   }
   const Camera camera = state_->camera.camera();
   const Light light = state_->light.light();
-  const Shown wanted{.dressing = state_->dressing().get(),
-                     .tile_set = state_->shown().get(),
+  const Shown wanted{.dressing = state_->dressing(),
+                     .tile_set = state_->shown(),
                      .eye = camera.eye,
                      .target = camera.target,
                      .light = light.place,

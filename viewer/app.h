@@ -63,8 +63,8 @@ class App {
   using Clock = std::chrono::steady_clock;
   // What a picture depends on; another one is asked for when it changes.
   struct Shown {
-    const Dressing* dressing = nullptr;
-    const TileSet* tile_set = nullptr;
+    std::shared_ptr<const Dressing> dressing;
+    std::shared_ptr<const TileSet> tile_set;
     Eigen::Vector3d eye{0, 0, 0};
     Eigen::Vector3d target{0, 0, 0};
     Eigen::Vector3d light{0, 0, 0};
