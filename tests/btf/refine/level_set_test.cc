@@ -63,6 +63,40 @@ TEST_P(CodecLevelSetTest, StandsAloneAndKeepsTheMean) {
   }
 }
 
+// Every second texel turned, of a material most of which is brighter lit from +x, the rest from +y: joined
+// unturned, a level would be too bright lit from +x.
+TEST_P(CodecLevelSetTest, TurnsWhatItJoins) {
+  const std::vector<Direction> directions = RingDirections(3, 8);
+  SampledBtf btf(6, 6, directions, directions);
+  for (int texel = 0; texel < 36; ++texel) {
+    for (size_t sample = 0; sample < 3 * directions.size() * directions.size(); ++sample) {
+      const size_t light = sample % directions.size();
+      const Eigen::Vector3d towards = VectorFromDirection(directions[light]);
+      const double slope = 0.3 * (texel % 3 == 0 ? towards.y() : towards.x());
+      btf.at(texel % 6, texel / 6, static_cast<int>(sample / directions.size() % 3),
+             sample / directions.size() / 3, light) = static_cast<float>(0.4 + 0.002 * texel + slope);
+    }
+  }
+  auto material =
+      Encode(GetParam(), btf, {.kl = 9, .kv = 9, .eigen_textures = 2, .rank = GetParam() == "dfmf" ? 12 : 0});
+  ASSERT_TRUE(material.ok()) << material.status();
+  TileSet tile_set = RandomTileSet(std::move(material->btfels), 8, 3);
+  for (size_t i = 0; i < tile_set.tile_index.size(); ++i) {
+    tile_set.tile_index[i] = PackTexel(BtfelOfTexel(tile_set.tile_index[i]), static_cast<int>(i % 2));
+  }
+  const auto level = MakeLevelSet(tile_set, 3, {});
+  ASSERT_TRUE(level.ok()) << level.status();
+  const Eigen::Vector3d view(0.0, 0.0, 1.0);
+  const Eigen::Vector3d from_x = Eigen::Vector3d(0.8, 0.0, 0.6);
+  const Eigen::Vector3d from_y = Eigen::Vector3d(0.0, 0.8, 0.6);
+  const Eigen::Vector3d from_minus_x = Eigen::Vector3d(-0.8, 0.0, 0.6);
+  for (const Eigen::Vector3d& light : {from_x, from_y, from_minus_x}) {
+    const Eigen::Array3d whole = MeanOfTile(tile_set, 5, light, view);
+    EXPECT_LT((whole - MeanOfTile(level->tile_set, 5, light, view)).abs().maxCoeff(), 0.02)
+        << light.transpose();
+  }
+}
+
 TEST(LevelSetTest, NamesTheLevelsThatThereAre) {
   const TileSet tile_set = RandomTileSet(testing::RandomBtfels(9, 4, 4, 1), 8, 3);
   for (const int level : {0, 4, -1}) {
