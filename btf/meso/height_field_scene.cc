@@ -7,8 +7,10 @@
 #include <string>
 
 #include <absl/status/status.h>
-#include <embree3/rtcore.h>
 #include <tbb/task_arena.h>
+
+#include "btf/base/embree_scene.h"
+#include "btf/base/status_macros.h"
 
 namespace tessera {
 namespace {
@@ -33,29 +35,14 @@ int WrapIndex(int i, int n) {
 
 }  // namespace
 
-struct HeightFieldScene::Embree {
-  RTCDevice device = nullptr;
-  RTCScene scene = nullptr;
-
-  ~Embree() {
-    if (scene != nullptr) {
-      rtcReleaseScene(scene);
-    }
-    if (device != nullptr) {
-      rtcReleaseDevice(device);
-    }
-  }
-};
+struct HeightFieldScene::Embree : EmbreeScene {};
 
 HeightFieldScene::HeightFieldScene(std::unique_ptr<Embree> embree) : embree_(std::move(embree)) {}
 HeightFieldScene::~HeightFieldScene() = default;
 
 absl::StatusOr<std::unique_ptr<HeightFieldScene>> HeightFieldScene::Create(const SurfaceMaps& maps) {
   auto embree = std::make_unique<Embree>();
-  embree->device = rtcNewDevice(nullptr);
-  if (embree->device == nullptr) {
-    return absl::InternalError("Embree: no device, error " + std::to_string(rtcGetDeviceError(nullptr)));
-  }
+  TESSERA_RETURN_IF_ERROR(embree->OpenDevice());
   const RTCDevice device = embree->device;
   std::unique_ptr<HeightFieldScene> result(new HeightFieldScene(std::move(embree)));
   const int n = maps.resolution();

@@ -7,9 +7,11 @@
 #include <utility>
 
 #include <absl/status/status.h>
-#include <embree3/rtcore.h>
 #include <tbb/task_arena.h>
 #include <Eigen/Geometry>
+
+#include "btf/base/embree_scene.h"
+#include "btf/base/status_macros.h"
 
 namespace tessera {
 namespace {
@@ -57,19 +59,7 @@ Eigen::Vector3d ClosestBarycentric(const Eigen::Vector3d& p, const Eigen::Vector
 
 }  // namespace
 
-struct ClosestPoint::Embree {
-  RTCDevice device = nullptr;
-  RTCScene scene = nullptr;
-
-  ~Embree() {
-    if (scene != nullptr) {
-      rtcReleaseScene(scene);
-    }
-    if (device != nullptr) {
-      rtcReleaseDevice(device);
-    }
-  }
-};
+struct ClosestPoint::Embree : EmbreeScene {};
 
 struct ClosestPoint::Query {
   const ClosestPoint* self = nullptr;
@@ -112,10 +102,7 @@ ClosestPoint::~ClosestPoint() = default;
 absl::StatusOr<ClosestPoint> ClosestPoint::Create(std::vector<Eigen::Vector3d> positions,
                                                   std::vector<Triangle> triangles) {
   auto embree = std::make_unique<Embree>();
-  embree->device = rtcNewDevice(nullptr);
-  if (embree->device == nullptr) {
-    return absl::InternalError("Embree: no device, error " + std::to_string(rtcGetDeviceError(nullptr)));
-  }
+  TESSERA_RETURN_IF_ERROR(embree->OpenDevice());
   const RTCDevice device = embree->device;
   const RTCGeometry geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_TRIANGLE);
   auto* vertices = static_cast<float*>(rtcSetNewGeometryBuffer(

@@ -5,35 +5,21 @@
 #include <utility>
 
 #include <absl/strings/str_cat.h>
-#include <embree3/rtcore.h>
 #include <tbb/task_arena.h>
+
+#include "btf/base/embree_scene.h"
+#include "btf/base/status_macros.h"
 
 namespace tessera {
 
-struct Occlusion::Embree {
-  RTCDevice device = nullptr;
-  RTCScene scene = nullptr;
-
-  ~Embree() {
-    if (scene != nullptr) {
-      rtcReleaseScene(scene);
-    }
-    if (device != nullptr) {
-      rtcReleaseDevice(device);
-    }
-  }
-};
+struct Occlusion::Embree : EmbreeScene {};
 
 Occlusion::Occlusion(std::unique_ptr<Embree> embree) : embree_(std::move(embree)) {}
 Occlusion::~Occlusion() = default;
 
 absl::StatusOr<std::unique_ptr<Occlusion>> Occlusion::Create(const SurfaceTriangles& triangles) {
   auto embree = std::make_unique<Embree>();
-  embree->device = rtcNewDevice(nullptr);
-  if (embree->device == nullptr) {
-    return absl::InternalError(
-        absl::StrCat("Embree: no device, error ", static_cast<int>(rtcGetDeviceError(nullptr))));
-  }
+  TESSERA_RETURN_IF_ERROR(embree->OpenDevice());
   const RTCDevice device = embree->device;
   const RTCGeometry geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_TRIANGLE);
   auto* vertices = static_cast<float*>(rtcSetNewGeometryBuffer(

@@ -33,6 +33,7 @@
 #include "btf/tiles/synthesize.h"
 #include "btf/wang/dress.h"
 #include "btf/wang/shapes.h"
+#include "tests/bench/bench_line.h"
 
 namespace tessera {
 namespace {
@@ -45,26 +46,6 @@ constexpr int kFiner = 8;
 // Silhouettes and faces' outlines stay, so less is asked for than a plane would give.
 constexpr double kMostOfError = 0.5;
 constexpr double kTexelsOfLimit = 16.0;  // along a pixel's side
-
-template <typename T>
-T Must(absl::StatusOr<T> result) {
-  if (!result.ok()) {
-    std::fprintf(stderr, "%s\n", result.status().ToString().c_str());
-    std::exit(1);
-  }
-  return *std::move(result);
-}
-
-bool Print(const std::string& name, double value, const char* unit, double limit) {
-  const bool ok = limit <= 0.0 || value <= limit;
-  if (limit > 0.0) {
-    std::printf("%s,%.4g,%s,%.4g,%s\n", name.c_str(), value, unit, limit, ok ? "ok" : "MISSED");
-  } else {
-    std::printf("%s,%.4g,%s,,\n", name.c_str(), value, unit);
-  }
-  std::fflush(stdout);
-  return ok;
-}
 
 double SecondsSince(Clock::time_point start) {
   return std::chrono::duration<double>(Clock::now() - start).count();

@@ -21,6 +21,7 @@
 #include "btf/render/offscreen_context.h"
 #include "btf/render/preview.h"
 #include "btf/render/reference.h"
+#include "tests/bench/bench_line.h"
 #include "tests/bench/repeated_row.h"
 #include "tests/btf/codec/synthetic_btf.h"
 #include "tests/btf/render/hand_made.h"
@@ -48,17 +49,6 @@ double ProcessorSeconds() {
     return static_cast<double>(time.tv_sec) + 1e-6 * static_cast<double>(time.tv_usec);
   };
   return (seconds(usage.ru_utime) + seconds(usage.ru_stime)) / std::thread::hardware_concurrency();
-}
-
-bool Print(const std::string& name, double value, const char* unit, double limit) {
-  const bool ok = limit <= 0.0 || value <= limit;
-  if (limit > 0.0) {
-    std::printf("%s,%.4g,%s,%.4g,%s\n", name.c_str(), value, unit, limit, ok ? "ok" : "MISSED");
-  } else {
-    std::printf("%s,%.4g,%s,,\n", name.c_str(), value, unit);
-  }
-  std::fflush(stdout);
-  return ok;
 }
 
 // An encoding of few texels, its BTFels as many as a tile set's and at random: speed does not depend on them.

@@ -40,6 +40,7 @@
 #include "btf/wang/shapes.h"
 #include "client/lib/client.h"
 #include "server/server.h"
+#include "tests/bench/bench_line.h"
 #include "tests/support/temp_folder.h"
 
 namespace tessera {
@@ -55,26 +56,6 @@ constexpr std::array<double, 3> kMostPixelsPerQuad = {8.0, 4.0, 2.0};
 constexpr int kRounds = 15;
 constexpr int kWidth = 160;
 constexpr int kHeight = 120;
-
-template <typename T>
-T Must(absl::StatusOr<T> result) {
-  if (!result.ok()) {
-    std::fprintf(stderr, "stream_bench: %s\n", result.status().ToString().c_str());
-    std::exit(EXIT_FAILURE);
-  }
-  return *std::move(result);
-}
-
-bool Print(const std::string& name, double value, const char* unit, double limit) {
-  const bool ok = limit <= 0.0 || value <= limit;
-  if (limit > 0.0) {
-    std::printf("%s,%.4g,%s,%.4g,%s\n", name.c_str(), value, unit, limit, ok ? "ok" : "MISSED");
-  } else {
-    std::printf("%s,%.4g,%s,,\n", name.c_str(), value, unit);
-  }
-  std::fflush(stdout);
-  return ok;
-}
 
 double MillisecondsSince(Clock::time_point begin) {
   return std::chrono::duration<double, std::milli>(Clock::now() - begin).count();
