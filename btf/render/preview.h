@@ -21,6 +21,7 @@
 
 namespace tessera {
 
+class FrequencyLight;
 class OffscreenContext;
 
 // The eye looks at the target; `up` points upwards in the picture, perpendicular or not.
@@ -57,9 +58,11 @@ struct PreviewScene {
   const TileMips* mips = nullptr;
   Camera camera;
   std::vector<Light> lights{Light{}};   // at most 4096
-  std::optional<ShadowParams> shadows;  // none: light goes through the surface
-  int width = 640;                      // 16..8192
-  int height = 480;                     // 16..8192
+  std::optional<ShadowParams> shadows;  // of `lights`; none: light goes through the surface
+  // Light from all around beside `lights`, or none (light/frequency_light.h). Nothing shadows it.
+  const FrequencyLight* frequency_light = nullptr;
+  int width = 640;   // 16..8192
+  int height = 480;  // 16..8192
   Filter filter = Filter::kBilinear;
 };
 

@@ -244,6 +244,9 @@ class Shader {
       shaded.radiance += ReflectanceOfTaps(surface_, decoder_, frame, taps, to_light.normalized(), to_eye) *
                          light.irradiance.array() * (falloff / kPi);
     }
+    if (scene_.frequency_light != nullptr) {
+      shaded.radiance += RadianceOfTaps(surface_, decoder_, frame, taps, *scene_.frequency_light, to_eye);
+    }
     return shaded;
   }
 

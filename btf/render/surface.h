@@ -16,6 +16,7 @@
 #include <Eigen/Core>
 
 #include "btf/codec/decoder.h"
+#include "btf/light/frequency_light.h"
 #include "btf/mips/tile_mips.h"
 #include "btf/wang/dressing.h"
 #include "btf/wang/neighbour.h"
@@ -132,5 +133,10 @@ class DressedSurface {
                                                const SurfaceFrame& frame, std::span<const Tap> taps,
                                                const Eigen::Vector3d& to_light,
                                                const Eigen::Vector3d& to_eye);
+
+// Radiance >= 0 of the taps under light from all around, as RadianceForm has it; the view as above.
+[[nodiscard]] Eigen::Array3d RadianceOfTaps(const DressedSurface& surface, const Decoder& decoder,
+                                            const SurfaceFrame& frame, std::span<const Tap> taps,
+                                            const FrequencyLight& light, const Eigen::Vector3d& to_eye);
 
 }  // namespace tessera
