@@ -69,10 +69,10 @@ struct Embedding {
 };
 
 // GLSL of a codec. Declares
-//   vec3 BlendBtfels(ivec4 btfels, ivec4 turns, vec4 weights, int count, vec3 light, vec3 view)
+//   vec3 BlendBtfels(ivec4 btfels, ivec4 turns, vec4 weights, int count, Incidence light, vec3 view)
 // the weighted sum of the first `count` BTFels' values, unclamped, each turned by its quarter turns, under
 // one pair of directions in the surface's frame, with the semantics of Decoder::Evaluate; it reads the
-// buffer textures below through texelFetch.
+// buffer textures below through texelFetch. `Incidence` is a macro, vec3 here.
 struct CodecGlsl {
   std::string source;
   int words_per_btfel = 0;
@@ -80,6 +80,15 @@ struct CodecGlsl {
   std::vector<float> shared_values;   // samplerBuffer `codec_values`, format RGBA32F, padded likewise
   std::vector<uint32_t>
       shared_words;  // usamplerBuffer `codec_words`, format RGBA32UI; not declared when empty
+};
+
+// The same for light in the frequency domain: Incidence is vec3[n], light from all around as the sum of
+// light[i] Y_i by directions of the surface's frame, and the sum has the semantics of Decoder::LightHarmonics
+// (pi times the radiance). Reads the buffers of the table's CodecGlsl, and these.
+struct HarmonicsGlsl {
+  std::string source;
+  std::vector<float> values;    // samplerBuffer `harmonics_values`, RGBA32F; not declared when empty
+  std::vector<uint32_t> words;  // usamplerBuffer `harmonics_words`, RGBA32UI; not declared when empty
 };
 
 // A BTFel turned by quarter turns, counter-clockwise, has coefficients c'[i] = sign[i] * c[source[i]].
@@ -112,6 +121,11 @@ class Codec {
   // table or parameter that is missing or misshapen, or the one of `more` that does not go with `table`.
   [[nodiscard]] virtual absl::StatusOr<CodecGlsl> Glsl(const BtfelTable& table,
                                                        std::span<const BtfelTable* const> more) const = 0;
+
+  // Beside Glsl() of the same tables; n is a legal count (math/spherical_harmonics.h). Errors: the same.
+  [[nodiscard]] virtual absl::StatusOr<HarmonicsGlsl> GlslOfHarmonics(const BtfelTable& table,
+                                                                      std::span<const BtfelTable* const> more,
+                                                                      int n) const = 0;
 
   // What quarter turns do to coefficients; nothing where turning is no signed permutation of them.
   // Errors: INVALID_ARGUMENT naming the table or parameter that is missing or misshapen.

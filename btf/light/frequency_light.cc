@@ -9,7 +9,6 @@
 #include <absl/strings/str_cat.h>
 
 #include "btf/base/status_macros.h"
-#include "btf/codec/light_harmonics.h"
 #include "btf/light/sh_rotation.h"
 #include "btf/math/conventions.h"
 #include "btf/math/hemisphere_gram.h"
@@ -185,12 +184,6 @@ LinearForm RadianceForm(const Decoder& decoder, const Eigen::Vector3d& view, con
     }
   }
   return sum;
-}
-
-Eigen::MatrixXd DshLightMatrix(const DshDecoder& decoder) {
-  return LightHarmonicIntegrals(
-      decoder.kl(), decoder.max_light_theta_rad(),
-      [&](const Eigen::Vector3d& light, std::span<double> values) { decoder.LightWeights(light, values); });
 }
 
 }  // namespace tessera

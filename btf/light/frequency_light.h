@@ -29,7 +29,6 @@
 #include <Eigen/Core>
 
 #include "btf/codec/decoder.h"
-#include "btf/codec/dsh/dsh_decoder.h"
 #include "btf/light/environment.h"
 
 namespace tessera {
@@ -71,11 +70,5 @@ class FrequencyLight {
 // integrates.
 [[nodiscard]] LinearForm RadianceForm(const Decoder& decoder, const Eigen::Vector3d& view,
                                       const Eigen::MatrixXd& light, int turns);
-
-// A for "dsh*" by itself, [kl][kMaxShFunctions]: integrals of the codec's light functions, as they decode,
-// with each harmonic. A.leftCols(n) * InFrame(..), [kl][3], is the light of one frame for every view: its
-// columns stand, one for each colour, where LightWeights of one light stand, pi times the radiance comes out.
-// Tens of milliseconds.
-[[nodiscard]] Eigen::MatrixXd DshLightMatrix(const DshDecoder& decoder);
 
 }  // namespace tessera

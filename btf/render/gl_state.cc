@@ -32,9 +32,17 @@ absl::StatusOr<GLuint> Compile(const GladGLContext& gl, GLenum kind, const std::
 }  // namespace
 
 GlState::~GlState() {
+  MakeRoom(kMaxPrograms);
+}
+
+void GlState::MakeRoom(size_t count) {
+  if (programs_.size() + count <= kMaxPrograms) {
+    return;
+  }
   for (const auto& [source, program] : programs_) {
     gl.DeleteProgram(program);
   }
+  programs_.clear();
 }
 
 absl::StatusOr<GLuint> GlState::Program(const std::string& vertex_source,
@@ -68,12 +76,7 @@ absl::StatusOr<GLuint> GlState::Program(const std::string& vertex_source,
     gl.DeleteProgram(program);
     return absl::InternalError(absl::StrCat("GL program does not link: ", log));
   }
-  if (programs_.size() >= kMaxPrograms) {
-    for (const auto& [source, old] : programs_) {
-      gl.DeleteProgram(old);
-    }
-    programs_.clear();
-  }
+  MakeRoom(1);
   programs_.emplace(key, program);
   return program;
 }

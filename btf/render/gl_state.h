@@ -18,10 +18,14 @@ class GlState {
   // The context must be current.
   ~GlState();
 
-  // The linked program of these two sources, compiled on first use and kept. Errors: INTERNAL with the
+  // The linked program of these two sources, compiled on first use and kept; when the context
+  // is full, all others are dropped. Errors: INTERNAL with the
   // driver's log.
   [[nodiscard]] absl::StatusOr<GLuint> Program(const std::string& vertex_source,
                                                const std::string& fragment_source);
+
+  // Drops all programs unless there is room for `count` more: those that are asked for next stay.
+  void MakeRoom(size_t count);
 
   // INTERNAL naming `where` and the GL error, if one is pending.
   [[nodiscard]] absl::Status CheckError(const char* where) const;

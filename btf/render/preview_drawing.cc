@@ -9,6 +9,7 @@
 #include <glm/vec3.hpp>
 
 #include "btf/base/status_macros.h"
+#include "btf/light/frequency_light.h"
 #include "btf/render/preview_shaders.h"
 
 namespace tessera {
@@ -122,30 +123,29 @@ void PreviewDrawing::SetShadows(const LightMaps& maps, int unit) {
                        matrices.data());
 }
 
-void PreviewDrawing::Shade(size_t light, int first_row, int num_rows) {
+int PreviewDrawing::BeginPass(GLuint program, bool is_first, int first_row, int num_rows) {
   gl_.BindFramebuffer(GL_FRAMEBUFFER, resources_.targets->pixel_target.name());
   gl_.Viewport(0, 0, scene_.width, resources_.targets->rows);
   gl_.Disable(GL_DEPTH_TEST);
   gl_.Enable(GL_SCISSOR_TEST);
   gl_.Scissor(0, first_row, scene_.width, num_rows);
-  // Lights add up; alpha is the same from each.
-  if (light == 0) {
+  // Passes add up; alpha is the same from each.
+  if (is_first) {
     gl_.Disable(GL_BLEND);
   } else {
     gl_.Enable(GL_BLEND);
   }
   gl_.BlendFuncSeparate(GL_ONE, GL_ONE, GL_ONE, GL_ZERO);
-  gl_.UseProgram(shade_program_);
+  gl_.UseProgram(program);
   gl_.BindVertexArray(resources_.no_vertices.name());
   gl_.ActiveTexture(GL_TEXTURE0);
   gl_.BindTexture(GL_TEXTURE_2D_ARRAY, resources_.targets->samples.name());
-  int unit = 0;
-  const auto location = [&](const char* name) { return gl_.GetUniformLocation(shade_program_, name); };
-  gl_.Uniform1i(location("surface_samples"), unit);
+  int units = 0;
+  const auto location = [&](const char* name) { return gl_.GetUniformLocation(program, name); };
+  gl_.Uniform1i(location("surface_samples"), units++);
   const auto bind = [&](const BufferTexture& texture, const char* name) {
-    ++unit;
-    texture.Bind(unit);
-    gl_.Uniform1i(location(name), unit);
+    texture.Bind(units);
+    gl_.Uniform1i(location(name), units++);
   };
   bind(resources_.face_corners, "face_corners");
   bind(resources_.face_links, "face_links");
@@ -153,23 +153,40 @@ void PreviewDrawing::Shade(size_t light, int first_row, int num_rows) {
   bind(resources_.btfel_words, "btfel_words");
   bind(resources_.codec_values, "codec_values");
   bind(resources_.codec_words, "codec_words");
-  if (scene_.shadows.has_value()) {
-    SetShadows(maps_[light - batch_begin_], ++unit);
-  }
+  bind(resources_.harmonics_values, "harmonics_values");
+  bind(resources_.harmonics_words, "harmonics_words");
 
   const glm::vec3 eye = GlmFromEigen(view_.eye - resources_.triangles.centre);
   gl_.Uniform1i(location("tile_size"), resources_.tile_set.tile_size);
   if (resources_.mips != nullptr) {
-    SetMips();
+    SetMips(program);
   }
   gl_.Uniform3fv(location("eye"), 1, &eye[0]);
+  return units;
+}
+
+void PreviewDrawing::Shade(size_t light, int first_row, int num_rows) {
+  const int units = BeginPass(shade_program_, light == 0, first_row, num_rows);
+  if (scene_.shadows.has_value()) {
+    SetShadows(maps_[light - batch_begin_], units);
+  }
   SetLight(light);
   gl_.DrawArrays(GL_TRIANGLES, 0, 3);
   gl_.Finish();
 }
 
-void PreviewDrawing::SetMips() {
-  const auto location = [&](const char* name) { return gl_.GetUniformLocation(shade_program_, name); };
+void PreviewDrawing::ShadeAllAround(int first_row, int num_rows) {
+  BeginPass(harmonics_program_, lights_.empty(), first_row, num_rows);
+  const Eigen::Matrix<float, Eigen::Dynamic, 3, Eigen::RowMajor> rows =
+      (scene_.frequency_light->coefficients() / kPi).cast<float>();
+  gl_.Uniform3fv(gl_.GetUniformLocation(harmonics_program_, "harmonics"), static_cast<GLsizei>(rows.rows()),
+                 rows.data());
+  gl_.DrawArrays(GL_TRIANGLES, 0, 3);
+  gl_.Finish();
+}
+
+void PreviewDrawing::SetMips(GLuint program) {
+  const auto location = [&](const char* name) { return gl_.GetUniformLocation(program, name); };
   const auto set_axis = [&](const char* name, const Eigen::Vector3d& axis) {
     const glm::vec3 value = GlmFromEigen(axis);
     gl_.Uniform3fv(location(name), 1, &value[0]);
@@ -187,7 +204,8 @@ void PreviewDrawing::SetMips() {
 absl::Status PreviewDrawing::ShadeBand(const Band& band, const RunContext& context) {
   const int strip_rows = std::max(kStripPixels / scene_.width, 1);
   const auto total_rows = static_cast<uint64_t>(scene_.height);
-  uint64_t light_rows = 0;
+  const size_t num_passes = lights_.size() + (scene_.frequency_light != nullptr ? 1 : 0);
+  uint64_t shaded_rows = 0;  // over all passes
   for (size_t begin = 0; begin < lights_.size();) {
     TESSERA_RETURN_IF_ERROR(context.CheckStop());
     const size_t num_lights = NextBatch(begin).size();
@@ -196,11 +214,18 @@ absl::Status PreviewDrawing::ShadeBand(const Band& band, const RunContext& conte
       for (size_t light = begin; light < begin + num_lights; ++light) {
         TESSERA_RETURN_IF_ERROR(context.CheckStop());
         Shade(light, strip, rows);
-        light_rows += rows;
+        shaded_rows += rows;
       }
-      context.Report("render", band.first + light_rows / lights_.size(), total_rows, "rows");
+      context.Report("render", band.first + shaded_rows / num_passes, total_rows, "rows");
     }
     begin += num_lights;
+  }
+  for (int strip = 0; scene_.frequency_light != nullptr && strip < band.rows; strip += strip_rows) {
+    TESSERA_RETURN_IF_ERROR(context.CheckStop());
+    const int rows = std::min(strip_rows, band.rows - strip);
+    ShadeAllAround(strip, rows);
+    shaded_rows += rows;
+    context.Report("render", band.first + shaded_rows / num_passes, total_rows, "rows");
   }
   return absl::OkStatus();
 }
@@ -228,26 +253,43 @@ absl::Status PreviewDrawing::PrepareTargets(int band_rows) {
   return absl::OkStatus();
 }
 
-absl::StatusOr<Image> PreviewDrawing::Draw(const RunContext& context) {
+absl::Status PreviewDrawing::PreparePrograms() {
   GlState& state = resources_.state;
-  const bool has_shadows = scene_.shadows.has_value();
-  // The codec's program first: when the context is full it drops all others.
-  TESSERA_ASSIGN_OR_RETURN(
-      shade_program_,
-      state.Program(FrameVertexShader(),
-                    ShadeFragmentShader(resources_.codec_source, {.filter = scene_.filter,
-                                                                  .has_mips = resources_.mips != nullptr,
-                                                                  .has_shadows = has_shadows})));
+  const ShadeVariant variant{.filter = scene_.filter,
+                             .has_mips = resources_.mips != nullptr,
+                             .has_shadows = scene_.shadows.has_value()};
+  constexpr size_t kMostPrograms = 5;
+  state.MakeRoom(kMostPrograms);
+  if (!lights_.empty()) {
+    TESSERA_ASSIGN_OR_RETURN(
+        shade_program_,
+        state.Program(FrameVertexShader(), ShadeFragmentShader(resources_.codec_source, variant)));
+  }
+  if (scene_.frequency_light != nullptr) {
+    const int n = scene_.frequency_light->num_functions();
+    TESSERA_RETURN_IF_ERROR(resources_.FillHarmonics(n));
+    TESSERA_ASSIGN_OR_RETURN(
+        harmonics_program_,
+        state.Program(FrameVertexShader(),
+                      ShadeFragmentShader(
+                          resources_.harmonics_source,
+                          {.filter = variant.filter, .has_mips = variant.has_mips, .num_harmonics = n})));
+  }
   TESSERA_ASSIGN_OR_RETURN(surface_program_, state.Program(SurfaceVertexShader(), SurfaceFragmentShader()));
   TESSERA_ASSIGN_OR_RETURN(empty_program_, state.Program(FrameVertexShader(), EmptySampleFragmentShader()));
-  if (has_shadows) {
+  if (variant.has_shadows) {
     TESSERA_ASSIGN_OR_RETURN(shadow_program_, state.Program(ShadowVertexShader(), ShadowFragmentShader()));
   }
+  return absl::OkStatus();
+}
+
+absl::StatusOr<Image> PreviewDrawing::Draw(const RunContext& context) {
   lights_ = scene_.lights;
-  if (lights_.empty()) {
+  if (lights_.empty() && scene_.frequency_light == nullptr) {
     // Drawn once in the dark, for its alpha.
     lights_.push_back({.irradiance = Eigen::Vector3d::Zero()});
   }
+  TESSERA_RETURN_IF_ERROR(PreparePrograms());
   const int band_rows = std::clamp(kBandPixels / scene_.width, 1, scene_.height);
   TESSERA_RETURN_IF_ERROR(PrepareTargets(band_rows));
   Image image(scene_.width, scene_.height, 4);
@@ -258,7 +300,7 @@ absl::StatusOr<Image> PreviewDrawing::Draw(const RunContext& context) {
     TESSERA_RETURN_IF_ERROR(ShadeBand(band, context));
     gl_.PixelStorei(GL_PACK_ALIGNMENT, 1);
     gl_.ReadPixels(0, 0, scene_.width, band.rows, GL_RGBA, GL_FLOAT, image.at(0, first));
-    TESSERA_RETURN_IF_ERROR(state.CheckError("drawing"));
+    TESSERA_RETURN_IF_ERROR(resources_.state.CheckError("drawing"));
   }
   return image;
 }

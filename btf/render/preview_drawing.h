@@ -14,7 +14,8 @@
 namespace tessera {
 
 // Each light is drawn on its own and added up in a float buffer, so that their number is bounded by time
-// alone. With shadows, lights go in batches, as many as have their maps at once. The context must be current.
+// alone; light from all around comes after them. With shadows, lights go in batches, as many as have their
+// maps at once. The context must be current.
 class PreviewDrawing {
  public:
   PreviewDrawing(GlPreview::Resources& resources, const PreviewScene& scene)
@@ -33,15 +34,19 @@ class PreviewDrawing {
     int rows = 0;
   };
 
+  absl::Status PreparePrograms();
   absl::Status PrepareTargets(int band_rows);
   void DrawSamples(const Band& band);
   // The next lights to draw from `first` on: all, or those whose maps it draws.
   std::span<const Light> NextBatch(size_t first);
   absl::Status ShadeBand(const Band& band, const RunContext& context);
+  // What every pass of `program` has in common; the number of texture units in use.
+  int BeginPass(GLuint program, bool is_first, int first_row, int num_rows);
   // `light` is the number of one in lights_, of the batch at hand.
   void Shade(size_t light, int first_row, int num_rows);
+  void ShadeAllAround(int first_row, int num_rows);
   void SetLight(size_t light);
-  void SetMips();
+  void SetMips(GLuint program);
   void SetShadows(const LightMaps& maps, int unit);
 
   GlPreview::Resources& resources_;
@@ -54,6 +59,7 @@ class PreviewDrawing {
   GLuint empty_program_ = 0;
   GLuint surface_program_ = 0;
   GLuint shade_program_ = 0;
+  GLuint harmonics_program_ = 0;
   GLuint shadow_program_ = 0;
 };
 

@@ -133,4 +133,30 @@ absl::Status GlPreview::Resources::Fill(const DressedSurface& surface, const Cod
   return state.CheckError("buffers");
 }
 
+absl::Status GlPreview::Resources::FillHarmonics(int n) {
+  if (n == num_harmonics) {
+    return absl::OkStatus();
+  }
+  std::vector<const BtfelTable*> levels;
+  if (mips != nullptr) {
+    for (const MipLevel& level : mips->levels) {
+      levels.push_back(&level.btfels);
+    }
+  }
+  TESSERA_ASSIGN_OR_RETURN(const HarmonicsGlsl glsl,
+                           FindCodec(tile_set.btfels.codec_id)->GlslOfHarmonics(tile_set.btfels, levels, n));
+  num_harmonics = 0;
+  if (!glsl.values.empty()) {
+    TESSERA_RETURN_IF_ERROR(harmonics_values.Fill(std::span<const float>(glsl.values), GL_RGBA32F, 4,
+                                                  "codec's tables under harmonics of light"));
+  }
+  if (!glsl.words.empty()) {
+    TESSERA_RETURN_IF_ERROR(harmonics_words.Fill(std::span<const uint32_t>(glsl.words), GL_RGBA32UI, 4,
+                                                 "codec's packed tables under harmonics of light"));
+  }
+  harmonics_source = glsl.source;
+  num_harmonics = n;
+  return absl::OkStatus();
+}
+
 }  // namespace tessera

@@ -85,6 +85,8 @@ class GlPreview::Resources {
         btfel_words(gl),
         codec_values(gl),
         codec_words(gl),
+        harmonics_values(gl),
+        harmonics_words(gl),
         vertices(gl),
         indices(gl),
         vertex_array(gl),
@@ -92,6 +94,8 @@ class GlPreview::Resources {
 
   // The context must be current.
   absl::Status Fill(const DressedSurface& surface, const CodecGlsl& codec);
+  // What the codec reads under `n` harmonics of light, unless it is there already.
+  absl::Status FillHarmonics(int n);
 
   GlState& state;
   const GladGLContext& gl;
@@ -106,11 +110,15 @@ class GlPreview::Resources {
   BufferTexture btfel_words;
   BufferTexture codec_values;
   BufferTexture codec_words;
+  BufferTexture harmonics_values;
+  BufferTexture harmonics_words;
   GlBuffer vertices;
   GlBuffer indices;
   GlVertexArray vertex_array;
   GlVertexArray no_vertices;
   std::string codec_source;
+  int num_harmonics = 0;  // of the last picture with light from all around
+  std::string harmonics_source;
   std::unique_ptr<PreviewTargets> targets;  // of the last picture
   std::unique_ptr<ShadowMaps> shadow_maps;  // of the last picture with shadows
 

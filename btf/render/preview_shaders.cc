@@ -1,8 +1,12 @@
 #include "btf/render/preview_shaders.h"
 
+#include <cmath>
+
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_format.h>
 
+#include "btf/light/sh_rotation.h"
+#include "btf/math/spherical_harmonics.h"
 #include "btf/render/preview_scene.h"
 #include "btf/render/shadow_views.h"
 #include "btf/render/surface.h"
@@ -73,8 +77,6 @@ uniform isamplerBuffer face_links;   // 2 a face: faces across the tile's sides;
 uniform usamplerBuffer tile_index;  // texels; with mip levels (part, weight), level after level
 uniform int tile_size;
 uniform vec3 eye;
-uniform vec4 light;  // w = 0: unit direction to it, 1: its position
-uniform vec3 irradiance_by_pi;
 out vec4 pixel;
 
 vec3 NormalizedOr(vec3 v, vec3 otherwise) {
@@ -176,7 +178,7 @@ void Footprint(int face, ivec4 links, vec2 st, Level level, out ivec4 btfels, ou
 // light, view), `members` and `samples` as Shade has them, ds and dq the changes of `position` with st.
 constexpr char kFilterTexels[] = R"(
 vec3 Filtered(int face, ivec4 links, vec2 st, int members, mat4x2 samples, vec3 position, vec3 ds, vec3 dq,
-              vec3 light, vec3 view) {
+              Incidence light, vec3 view) {
   Level level = Level(tile_size, 0, 1, 0);
   ivec4 btfels = ivec4(0), turns = ivec4(0);
   vec4 weights = vec4(0.0);
@@ -226,7 +228,7 @@ float MipLevelAt(vec3 position, vec3 ds, vec3 dq) {
 }
 
 vec3 Filtered(int face, ivec4 links, vec2 st, int members, mat4x2 samples, vec3 position, vec3 ds, vec3 dq,
-              vec3 light, vec3 view) {
+              Incidence light, vec3 view) {
   float at = MipLevelAt(position, ds, dq);
   int below = int(at);
   float share_above = at - float(below);
@@ -246,6 +248,25 @@ vec3 Filtered(int face, ivec4 links, vec2 st, int members, mat4x2 samples, vec3 
     sum += BlendBtfels(btfels, turns, weights, weights == vec4(0.0) ? 0 : 4, light, view);
   } while (++i < end);
   return sum;
+}
+)";
+
+// How one light comes in at a point: Incidence LightAt(position, t, b, n, falloff), in the frame of these
+// axes.
+constexpr char kOneLight[] = R"(
+uniform vec4 light;  // w = 0: unit direction to it, 1: its position
+uniform vec3 irradiance_by_pi;
+
+Incidence LightAt(vec3 position, vec3 t, vec3 b, vec3 n, out vec3 falloff) {
+  vec3 to_light = light.xyz;
+  falloff = irradiance_by_pi;
+  if (light.w != 0.0) {
+    to_light -= position;
+    float squared = max(dot(to_light, to_light), 1e-24);
+    falloff /= squared;
+    to_light *= inversesqrt(squared);
+  }
+  return vec3(dot(to_light, t), dot(to_light, b), dot(to_light, n));
 }
 )";
 
@@ -303,7 +324,7 @@ float Visibility(int face, vec2 st, vec3 n) {
 
 constexpr char kShadeTail[] = R"(
 
-// Value times irradiance / pi at a point of the front of a face. members: how many of `samples` to read as
+// Radiance at a point of the front of a face. members: how many of `samples` to read as
 // single texels, 0 for a bilinear footprint at st.
 vec3 Shade(int face, vec2 st, int members, mat4x2 samples) {
   vec3 p0 = texelFetch(face_corners, 8 * face).xyz;
@@ -327,24 +348,21 @@ vec3 Shade(int face, vec2 st, int members, mat4x2 samples) {
   b = cross(n, t);
 
   ivec4 links = texelFetch(face_links, 2 * face + 1);
-  vec3 to_light = light.xyz;
-  float falloff = 1.0;
-  if (light.w != 0.0) {
-    to_light -= position;
-    float squared = max(dot(to_light, to_light), 1e-24);
-    falloff = 1.0 / squared;
-    to_light *= inversesqrt(squared);
-  }
+  // The axes of the unturned tile.
+  vec3 x = (links.y & 1) != 0 ? b : t;
+  x = (links.y & 2) != 0 ? -x : x;
+  vec3 y = cross(n, x);
+  vec3 falloff;
+  Incidence local_light = LightAt(position, x, y, n, falloff);
   vec3 to_eye = normalize(eye - position);
-  vec3 local_light = vec3(Unturned(vec2(dot(to_light, t), dot(to_light, b)), links.y), dot(to_light, n));
-  vec3 local_view = vec3(Unturned(vec2(dot(to_eye, t), dot(to_eye, b)), links.y), dot(to_eye, n));
+  vec3 local_view = vec3(dot(to_eye, x), dot(to_eye, y), dot(to_eye, n));
   if (local_view.z < kLeastViewCosine) {
     local_view = normalize(vec3(local_view.xy, kLeastViewCosine));
   }
 
   vec3 value = Filtered(face, links, st, members, samples, position, mix(p1 - p0, p2 - p3, st.y),
                         mix(p3 - p0, p2 - p1, st.x), local_light, local_view);
-  return max(value, vec3(0.0)) * irradiance_by_pi * falloff * Visibility(face, st, n);
+  return max(value, vec3(0.0)) * falloff * Visibility(face, st, n);
 }
 
 void main() {
@@ -393,6 +411,66 @@ void main() {
 }
 )";
 
+// Of pi times the light from all around, `n` harmonics by directions of the world: LightAt. The frame's axis
+// n is turned from the pole in two steps, by the azimuth and, about y, by the polar angle; what then is left
+// is a turn about n. About z harmonics turn in pairs, and a turn about y is one about z between two by a
+// quarter about x, whose matrices are constants, mostly zeros: a third of the multiplications that the
+// recursion of sh_rotation.h takes, from which the constants come. At the pole any azimuth does, as the last
+// turn follows from the other two.
+std::string HarmonicsAt(int n) {
+  const int degree = ShDegree(n);
+  std::string out = absl::StrFormat(R"(
+uniform vec3 harmonics[%d];
+
+void TurnAboutZ(inout vec3 c[%d], float cosine, float sine) {
+  vec2 p = vec2(1.0, 0.0);
+  vec3 v;
+)",
+                                    n, n);
+  for (int m = 1; m <= degree; ++m) {
+    absl::StrAppend(&out, "  p = vec2(p.x * cosine - p.y * sine, p.x * sine + p.y * cosine);\n");
+    for (int l = m; l <= degree; ++l) {
+      absl::StrAppendFormat(
+          &out, "  v = c[%1$d]; c[%1$d] = v * p.x - c[%2$d] * p.y; c[%2$d] = v * p.y + c[%2$d] * p.x;\n",
+          l * (l + 1) + m, l * (l + 1) - m);
+    }
+  }
+  absl::StrAppend(&out, "}\n");
+  Eigen::Matrix3d quarter;  // about x
+  quarter << 1, 0, 0, 0, 0, -1, 0, 1, 0;
+  const auto append_turn = [&](const char* name, const Eigen::Matrix3d& rotation) {
+    const Eigen::MatrixXd matrix = ShRotation(rotation, degree).Matrix();
+    absl::StrAppendFormat(&out, "void %s(inout vec3 c[%d]) {\n  vec3 v[%d] = c;\n", name, n, n);
+    for (int i = 1; i < n; ++i) {
+      absl::StrAppendFormat(&out, "  c[%d] = vec3(0.0)", i);
+      for (int j = 0; j < n; ++j) {
+        if (std::abs(matrix(i, j)) > 1e-12) {
+          absl::StrAppendFormat(&out, " + %.9e * v[%d]", matrix(i, j), j);
+        }
+      }
+      absl::StrAppend(&out, ";\n");
+    }
+    absl::StrAppend(&out, "}\n");
+  };
+  append_turn("TurnAboutX", quarter);
+  append_turn("TurnBackAboutX", quarter.transpose());
+  absl::StrAppend(&out, R"(
+Incidence LightAt(vec3 position, vec3 t, vec3 b, vec3 n, out vec3 falloff) {
+  falloff = vec3(1.0);
+  float sine = length(n.xy);
+  vec2 azimuth = sine > 1e-6 ? n.xy / sine : vec2(1.0, 0.0);
+  Incidence c = harmonics;
+  TurnAboutZ(c, azimuth.x, -azimuth.y);
+  TurnAboutX(c);
+  TurnAboutZ(c, n.z, -sine);
+  TurnBackAboutX(c);
+  TurnAboutZ(c, dot(t, vec3(n.z * azimuth, -sine)), -dot(t, vec3(-azimuth.y, azimuth.x, 0.0)));
+  return c;
+}
+)");
+  return out;
+}
+
 }  // namespace
 
 std::string SurfaceVertexShader() {
@@ -431,6 +509,7 @@ std::string ShadeFragmentShader(const std::string& codec_source, const ShadeVari
                       "const bool kNearest = ", is_nearest ? "true" : "false", ";\n",
                       "const bool kHasMips = ", variant.has_mips ? "true" : "false", ";\n", codec_source,
                       kShadeHead, variant.has_mips && !is_nearest ? kFilterMips : kFilterTexels,
+                      variant.num_harmonics > 0 ? HarmonicsAt(variant.num_harmonics) : kOneLight,
                       variant.has_shadows ? kShadows : kNoShadows, kShadeTail);
 }
 

@@ -24,8 +24,9 @@ struct ShadeVariant {
   Filter filter = Filter::kBilinear;
   bool has_mips = false;  // levels stand behind the tile set's texels
   bool has_shadows = false;
+  int num_harmonics = 0;  // of light from all around, in which there are no shadows; 0: one light
 };
-// `codec_source` is CodecGlsl::source.
+// `codec_source` is CodecGlsl::source, or HarmonicsGlsl::source for that number.
 [[nodiscard]] std::string ShadeFragmentShader(const std::string& codec_source, const ShadeVariant& variant);
 
 }  // namespace tessera

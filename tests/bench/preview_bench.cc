@@ -24,6 +24,7 @@
 #include "tests/bench/bench_line.h"
 #include "tests/bench/repeated_row.h"
 #include "tests/btf/codec/synthetic_btf.h"
+#include "tests/btf/render/codec_preview.h"
 #include "tests/btf/render/hand_made.h"
 
 namespace tessera {
@@ -137,7 +138,7 @@ bool PrintCost(const std::string& name, const Cost& cost, double limit) {
 
 // Limits in seconds, 0 for none.
 bool TimeCodec(OffscreenContext& context, const std::string& name, BtfelTable btfels, double nearest_limit,
-               double bilinear_limit) {
+               double bilinear_limit, double sky_limit) {
   Frame frame(std::move(btfels), kTexelsPerPixel);
   auto start = Clock::now();
   std::unique_ptr<GlPreview> preview = Prepare(context, frame);
@@ -154,6 +155,15 @@ bool TimeCodec(OffscreenContext& context, const std::string& name, BtfelTable bt
     ok &= PrintCost(name + (is_nearest ? "_nearest" : "_bilinear"), TimePicture(*preview, frame.scene),
                     is_nearest ? nearest_limit : bilinear_limit);
   }
+  // Light from all around alone, in the frequency domain, bilinear.
+  const FrequencyLight sky = testing::RandomFrequencyLight(25, 6);
+  PreviewScene under_sky = frame.scene;
+  under_sky.lights.clear();
+  under_sky.frequency_light = &sky;
+  start = Clock::now();
+  (void)preview->Render(under_sky, {});
+  Print(name + "_sky_first_with_shaders", SecondsSince(start), "s", 0.0);
+  ok &= PrintCost(name + "_sky", TimePicture(*preview, under_sky), sky_limit);
   PreviewScene small = frame.scene;
   small.width = 160;
   small.height = 120;
@@ -178,17 +188,18 @@ int Run() {
   std::fprintf(stderr, "%s\n", (*context)->Description().c_str());
   constexpr double kDshNearest = 0.15;
   constexpr double kDshBilinear = 0.5;
+  constexpr double kSky = 0.3;  // 25 harmonics
   const auto dsh = [] { return testing::RandomBtfels(kBtfels, 25, 25, 3, testing::BasisKind::kOrthonormal); };
-  bool ok = TimeCodec(**context, "dsh_25x25", dsh(), kDshNearest, kDshBilinear);
+  bool ok = TimeCodec(**context, "dsh_25x25", dsh(), kDshNearest, kDshBilinear, kSky);
   for (const int rank : {24, 48}) {
     BtfelTable btfels = EncodedBtfels("dfmf", {.rank = rank});
     ok &= TimeCodec(**context, absl::StrCat("dfmf_", rank), std::move(btfels), kDshNearest / 3.0,
-                    kDshBilinear / 3.0);
+                    kDshBilinear / 3.0, kSky);
   }
-  ok &= TimeCodec(**context, "view-pca_5", EncodedBtfels("view-pca", {.eigen_textures = 5}), 0.0, 0.0);
+  ok &= TimeCodec(**context, "view-pca_5", EncodedBtfels("view-pca", {.eigen_textures = 5}), 0.0, 0.0, kSky);
 
   // Hardly any decoding: what all codecs' pictures cost beside it.
-  ok &= TimeCodec(**context, "dsh_1x1", testing::RandomBtfels(kBtfels, 1, 1, 3), 0.0, 0.0);
+  ok &= TimeCodec(**context, "dsh_1x1", testing::RandomBtfels(kBtfels, 1, 1, 3), 0.0, 0.0, 0.0);
 
   const Frame minified(dsh(), 2.5);
   PrintCost("dsh_25x25_minified", TimePicture(*Prepare(**context, minified), minified.scene), 0.0);

@@ -21,4 +21,10 @@ absl::StatusOr<CodecGlsl> DfmfCodec::Glsl(const BtfelTable& table,
   return DfmfGlsl(table, more);
 }
 
+absl::StatusOr<HarmonicsGlsl> DfmfCodec::GlslOfHarmonics(const BtfelTable& table,
+                                                         std::span<const BtfelTable* const> more,
+                                                         int n) const {
+  return DfmfHarmonicsGlsl(table, more, n);
+}
+
 }  // namespace tessera

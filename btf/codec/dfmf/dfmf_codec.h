@@ -16,6 +16,9 @@ class DfmfCodec final : public Codec {
                                                 const RunContext& context) const override;
   [[nodiscard]] absl::StatusOr<CodecGlsl> Glsl(const BtfelTable& table,
                                                std::span<const BtfelTable* const> more) const override;
+  [[nodiscard]] absl::StatusOr<HarmonicsGlsl> GlslOfHarmonics(const BtfelTable& table,
+                                                              std::span<const BtfelTable* const> more,
+                                                              int n) const override;
 };
 
 }  // namespace tessera

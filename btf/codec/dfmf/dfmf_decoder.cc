@@ -196,8 +196,7 @@ LinearForm DfmfDecoder::Form(const Eigen::Vector3d& light, const Eigen::Vector3d
   return Factors(light, view, factors) ? FormOf(factors) : LinearForm{};
 }
 
-std::vector<LinearForm> DfmfDecoder::LightHarmonics(int n, const Eigen::Vector3d& view) const {
-  assert(IsShFunctionCount(n));
+const Eigen::MatrixXd& DfmfDecoder::LightIntegrals() const {
   std::call_once(is_integrated_, [this] {
     light_integrals_ = LightHarmonicIntegrals(light_.grid.num_nodes(), light_.max_theta_rad,
                                               [this](const Eigen::Vector3d& light, std::span<double> values) {
@@ -209,24 +208,33 @@ std::vector<LinearForm> DfmfDecoder::LightHarmonics(int n, const Eigen::Vector3d
                                                 }
                                               });
   });
-  std::vector<LinearForm> forms(n);
-  if (view.z() <= 0.0) {
-    return forms;
-  }
-  const DirectionGrid::Stencil v = view_.grid.Find(view);
+  return light_integrals_;
+}
+
+Eigen::MatrixXd DfmfDecoder::FactorsUnderHarmonics(const DirectionGrid::Stencil& view, int n) const {
   const Eigen::Index k = num_factors();
   Eigen::MatrixXd factors = Eigen::MatrixXd::Zero(k, n);
   for (int node = 0; node < light_.grid.num_nodes(); ++node) {
     Eigen::VectorXd at_view = Eigen::VectorXd::Zero(k);
     for (int corner = 0; corner < 3; ++corner) {
-      const size_t pair = static_cast<size_t>(node) * view_.grid.num_nodes() + v.nodes[corner];
-      at_view +=
-          v.weights[corner] * Eigen::Map<const Eigen::VectorXf>(grid().data() + pair * k, k).cast<double>();
+      const size_t pair = static_cast<size_t>(node) * view_.grid.num_nodes() + view.nodes[corner];
+      at_view += view.weights[corner] *
+                 Eigen::Map<const Eigen::VectorXf>(grid().data() + pair * k, k).cast<double>();
     }
-    factors.noalias() += at_view * light_integrals_.row(node).head(n);
+    factors.noalias() += at_view * LightIntegrals().row(node).head(n);
   }
+  return factors;
+}
+
+std::vector<LinearForm> DfmfDecoder::LightHarmonics(int n, const Eigen::Vector3d& view) const {
+  assert(IsShFunctionCount(n));
+  std::vector<LinearForm> forms(n);
+  if (view.z() <= 0.0) {
+    return forms;
+  }
+  const Eigen::MatrixXd factors = FactorsUnderHarmonics(view_.grid.Find(view), n);
   for (int i = 0; i < n; ++i) {
-    forms[i] = FormOf(std::span(factors.col(i).data(), static_cast<size_t>(k)));
+    forms[i] = FormOf(std::span(factors.col(i).data(), static_cast<size_t>(factors.rows())));
   }
   return forms;
 }

@@ -68,6 +68,12 @@ class DfmfDecoder final : public Decoder {
   // or below the horizon. Directions are unit, in the unturned frame.
   bool Factors(const Eigen::Vector3d& light, const Eigen::Vector3d& view, std::span<double> factors) const;
 
+  // Integrals of the lights' hats, as they decode, with each harmonic, [light nodes][kMaxShFunctions]. The
+  // first call integrates.
+  [[nodiscard]] const Eigen::MatrixXd& LightIntegrals() const;
+  // The factors of a view under each of the first `n` harmonics of light, [num_factors()][n].
+  [[nodiscard]] Eigen::MatrixXd FactorsUnderHarmonics(const DirectionGrid::Stencil& view, int n) const;
+
   [[nodiscard]] LinearForm Form(const Eigen::Vector3d& light, const Eigen::Vector3d& view) const override;
   [[nodiscard]] std::vector<LinearForm> LightHarmonics(int n, const Eigen::Vector3d& view) const override;
 
@@ -100,7 +106,7 @@ class DfmfDecoder final : public Decoder {
   mutable std::once_flag is_resampled_;
   mutable std::vector<float> grid_;
   mutable std::once_flag is_integrated_;
-  mutable Eigen::MatrixXd light_integrals_;  // [light nodes][kMaxShFunctions]
+  mutable Eigen::MatrixXd light_integrals_;
 };
 
 }  // namespace tessera

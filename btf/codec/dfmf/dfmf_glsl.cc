@@ -113,10 +113,10 @@ std::string BlendCodes(const std::string& group, int btfel_texels) {
 }
 
 std::string Source(const Layout& layout) {
-  std::string out = kHead;
+  std::string out = absl::StrCat(kHead, kUnturnedDirectionGlsl, kDirectionIncidenceGlsl);
   absl::StrAppend(
       &out, absl::Substitute(R"(
-vec3 BlendUnturned(ivec4 btfels, vec4 weights, int count, vec3 light, vec3 view) {
+vec3 BlendUnturned(ivec4 btfels, vec4 weights, int count, Incidence light, vec3 view) {
   vec4 limits = texelFetch(codec_values, 0);
   bool is_lit = light.z > 0.0 && view.z > 0.0 && count > 0;
   ivec3 light_nodes, view_nodes;
@@ -153,7 +153,64 @@ vec3 BlendUnturned(ivec4 btfels, vec4 weights, int count, vec3 light, vec3 view)
   return is_lit ? scale * value : vec3(0.0);
 }
 )",
-                  kUnturnedDirectionGlsl, kBlendByTurnGlsl);
+                  kBlendByTurnGlsl);
+  return out;
+}
+
+// Adds to the colour `sum` what the blended codes of group `group` are under each of `n` harmonics.
+std::string AddUnderHarmonics(const std::string& group, const std::string& sum, int n) {
+  std::string out = absl::Substitute("    at = words + ($0) * $1;\n", group, n);
+  for (int i = 0; i < n; ++i) {
+    if (i % 4 == 0) {
+      absl::StrAppend(&out, absl::Substitute("    q = texelFetch(harmonics_values, ($0) * $1 + $2);\n", group,
+                                             (n + 3) / 4, i / 4));
+    }
+    absl::StrAppend(&out, absl::Substitute(R"(    u0 = texelFetch(harmonics_words, at.x + $0);
+    u1 = texelFetch(harmonics_words, at.y + $0);
+    u2 = texelFetch(harmonics_words, at.z + $0);
+    even = view_weights.x * Low(u0) + view_weights.y * Low(u1) + view_weights.z * Low(u2);
+    odd = view_weights.x * High(u0) + view_weights.y * High(u1) + view_weights.z * High(u2);
+    $1 += (q[$2] * (dot(even, even_codes) * 2.3283064365386963e-10 + dot(odd, odd_codes))) * light[$0];
+)",
+                                           i, sum, i % 4));
+  }
+  return out;
+}
+
+std::string SourceOfHarmonics(const Layout& layout, int n) {
+  std::string out = absl::StrCat(
+      kHead, "uniform samplerBuffer harmonics_values;\nuniform usamplerBuffer harmonics_words;\n",
+      kUnturnedDirectionGlsl, HarmonicsIncidenceGlsl(n),
+      absl::Substitute(R"(
+vec3 BlendUnturned(ivec4 btfels, vec4 weights, int count, Incidence light, vec3 view) {
+  bool is_lit = view.z > 0.0 && count > 0;
+  ivec3 view_nodes, at;
+  vec3 view_weights, luma = vec3(0.0), first_chroma = vec3(0.0), second_chroma = vec3(0.0);
+  FindNodes(view, texelFetch(codec_values, 0).z, $0, view_nodes, view_weights);
+  ivec3 words = view_nodes * $1;
+  uvec4 u, u0, u1, u2;
+  vec4 q, even, odd;
+  int n, g = 0;
+  do {
+)",
+                       layout.view_nodes, layout.num_groups() * n),
+      BlendCodes("g", layout.btfel_texels()), AddUnderHarmonics("g", "luma", n), "  } while (++g < ",
+      layout.luma_groups, ");\n");
+  if (layout.chroma_groups > 0) {
+    const std::string first = absl::StrCat("g + ", layout.luma_groups);
+    absl::StrAppend(&out, "  g = 0;\n  do {\n", BlendCodes(first, layout.btfel_texels()),
+                    AddUnderHarmonics(first, "first_chroma", n),
+                    AddUnderHarmonics(absl::StrCat("g + ", layout.luma_groups + layout.chroma_groups),
+                                      "second_chroma", n),
+                    "  } while (++g < ", layout.chroma_groups, ");\n");
+  }
+  absl::StrAppend(&out, R"(
+  vec3 value = luma * texelFetch(codec_values, 1).xyz + first_chroma * texelFetch(codec_values, 2).xyz +
+               second_chroma * texelFetch(codec_values, 3).xyz;
+  return is_lit ? value : vec3(0.0);
+}
+)",
+                  kBlendByTurnGlsl);
   return out;
 }
 
@@ -222,6 +279,50 @@ void PackFactors(const DfmfDecoder& decoder, std::span<const float> scales, cons
   }
 }
 
+// Of each view node, group and harmonic the factors, and what one step of their codes is worth.
+void PackFactorsUnderHarmonics(const DfmfDecoder& decoder, std::span<const float> scales, int n,
+                               HarmonicsGlsl& glsl) {
+  const std::vector<Group> groups = GroupsOf(decoder);
+  const int num_views = decoder.view_grid().num_nodes();
+  std::vector<Eigen::MatrixXd> factors(num_views);
+  for (int view = 0; view < num_views; ++view) {
+    factors[view] = decoder.FactorsUnderHarmonics({{view, view, view}, {1.0, 0.0, 0.0}}, n);
+  }
+  const size_t row = (static_cast<size_t>(n) + 3) / 4 * 4;
+  glsl.values.assign(groups.size() * row, 0.0F);
+  glsl.words.assign(num_views * groups.size() * n * 4, 0);
+  for (size_t g = 0; g < groups.size(); ++g) {
+    const Group& group = groups[g];
+    for (int i = 0; i < n; ++i) {
+      const auto factor = [&](int view, int f) {
+        return static_cast<float>(factors[view](group.factor + f, i)) * scales[group.coefficient + f];
+      };
+      float most = 0.0F;
+      for (int view = 0; view < num_views; ++view) {
+        for (int f = 0; f < group.count; ++f) {
+          most = std::max(most, std::abs(factor(view, f)));
+        }
+      }
+      glsl.values[g * row + i] = most / kMostCode;
+      const float inverse = most > 0.0F ? kMostCode / most : 0.0F;
+      for (int view = 0; view < num_views; ++view) {
+        uint32_t* const words = glsl.words.data() + ((view * groups.size() + g) * n + i) * 4;
+        for (int f = 0; f < group.count; ++f) {
+          words[f / 2] |= Code16(factor(view, f) * inverse) << (16 * (f % 2));
+        }
+      }
+    }
+  }
+}
+
+// What one step of each coefficient's 16-bit code is worth.
+std::vector<float> CodeScales(const BtfelTable& table, std::span<const BtfelTable* const> more) {
+  std::vector<float> scales(table.num_coefficients);
+  std::ranges::transform(LargestMagnitudes(table, more), scales.begin(),
+                         [](double largest) { return static_cast<float>(largest) / kMostCode; });
+  return scales;
+}
+
 // The table's BTFels as multiples of `scales`; `words` are 0 and have room for them. Where they end.
 uint32_t* PackBtfels(const BtfelTable& table, std::span<const float> scales, size_t luma_rank,
                      const Layout& layout, uint32_t* words) {
@@ -261,9 +362,7 @@ absl::StatusOr<CodecGlsl> DfmfGlsl(const BtfelTable& table, std::span<const Btfe
       glsl.shared_values[4 * (1 + j) + channel] = static_cast<float>(decoder->colour()(channel, j));
     }
   }
-  std::vector<float> scales(k);
-  std::ranges::transform(LargestMagnitudes(table, more), scales.begin(),
-                         [](double largest) { return static_cast<float>(largest) / kMostCode; });
+  const std::vector<float> scales = CodeScales(table, more);
   PackFactors(*decoder, scales, layout, glsl);
 
   glsl.words_per_btfel = layout.btfel_texels() * 4;
@@ -273,6 +372,15 @@ absl::StatusOr<CodecGlsl> DfmfGlsl(const BtfelTable& table, std::span<const Btfe
   for (const BtfelTable* const other : more) {
     words = PackBtfels(*other, scales, luma_rank, layout, words);
   }
+  return glsl;
+}
+
+absl::StatusOr<HarmonicsGlsl> DfmfHarmonicsGlsl(const BtfelTable& table,
+                                                std::span<const BtfelTable* const> more, int n) {
+  TESSERA_ASSIGN_OR_RETURN(const std::unique_ptr<DfmfDecoder> decoder, DfmfDecoder::Create(table));
+  TESSERA_RETURN_IF_ERROR(CheckSameCoefficients(table, more));
+  HarmonicsGlsl glsl{.source = SourceOfHarmonics(Layout(*decoder), n)};
+  PackFactorsUnderHarmonics(*decoder, CodeScales(table, more), n, glsl);
   return glsl;
 }
 

@@ -21,6 +21,12 @@ absl::StatusOr<CodecGlsl> DshCodec::Glsl(const BtfelTable& table,
   return DshGlsl(table, more);
 }
 
+absl::StatusOr<HarmonicsGlsl> DshCodec::GlslOfHarmonics(const BtfelTable& table,
+                                                        std::span<const BtfelTable* const> /*more*/,
+                                                        int n) const {
+  return DshHarmonicsGlsl(table, n);
+}
+
 absl::StatusOr<std::optional<CoefficientTurns>> DshCodec::Turns(const BtfelTable& table) const {
   return DshTurns(table);
 }

@@ -24,6 +24,9 @@ class DshCodec final : public Codec {
                                                 const RunContext& context) const override;
   [[nodiscard]] absl::StatusOr<CodecGlsl> Glsl(const BtfelTable& table,
                                                std::span<const BtfelTable* const> more) const override;
+  [[nodiscard]] absl::StatusOr<HarmonicsGlsl> GlslOfHarmonics(const BtfelTable& table,
+                                                              std::span<const BtfelTable* const> more,
+                                                              int n) const override;
   [[nodiscard]] absl::StatusOr<std::optional<CoefficientTurns>> Turns(const BtfelTable& table) const override;
 
  private:

@@ -125,15 +125,17 @@ LinearForm DshDecoder::Form(const Eigen::Vector3d& light, const Eigen::Vector3d&
   return FormOf(light_weights, view_weights);
 }
 
+const Eigen::MatrixXd& DshDecoder::LightIntegrals() const {
+  std::call_once(is_integrated_, [this] {
+    light_integrals_ = LightHarmonicIntegrals(
+        kl(), light_limit_.theta_rad,
+        [this](const Eigen::Vector3d& light, std::span<double> values) { LightWeights(light, values); });
+  });
+  return light_integrals_;
+}
+
 std::vector<LinearForm> DshDecoder::LightHarmonics(int n, const Eigen::Vector3d& view) const {
   assert(IsShFunctionCount(n));
-  std::call_once(is_integrated_, [this] {
-    light_integrals_ = LightHarmonicIntegrals(kl(), light_limit_.theta_rad,
-                                              [this](const Eigen::Vector3d& light, std::span<double> values) {
-                                                LightWeights(light, values);
-                                              })
-                           .transpose();
-  });
   std::vector<LinearForm> forms(n);
   std::array<double, kMaxShFunctions> view_weights{};
   if (view.z() <= 0.0) {
@@ -141,8 +143,7 @@ std::vector<LinearForm> DshDecoder::LightHarmonics(int n, const Eigen::Vector3d&
   }
   ViewWeights(view, std::span(view_weights).first(kv()));
   for (int i = 0; i < n; ++i) {
-    const Eigen::VectorXd light_weights = light_integrals_.row(i);
-    forms[i] = FormOf(std::span(light_weights.data(), kl()), view_weights);
+    forms[i] = FormOf(std::span(LightIntegrals().col(i).data(), kl()), view_weights);
   }
   return forms;
 }

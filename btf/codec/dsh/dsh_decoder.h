@@ -44,6 +44,11 @@ class DshDecoder final : public Decoder {
   void LightWeights(const Eigen::Vector3d& light, std::span<double> weights) const;
   void ViewWeights(const Eigen::Vector3d& view, std::span<double> weights) const;
 
+  // A of [Leung2007] eq. 2, [kl][kMaxShFunctions]: the integrals of LightWeights with each harmonic. Times
+  // the harmonics of an environment in the BTFel's own frame, they stand where LightWeights of one light
+  // stand, and pi times the radiance comes out. The first call integrates.
+  [[nodiscard]] const Eigen::MatrixXd& LightIntegrals() const;
+
   [[nodiscard]] LinearForm Form(const Eigen::Vector3d& light, const Eigen::Vector3d& view) const override;
   [[nodiscard]] std::vector<LinearForm> LightHarmonics(int n, const Eigen::Vector3d& view) const override;
 
@@ -70,7 +75,7 @@ class DshDecoder final : public Decoder {
   PolarLimit light_limit_;
   PolarLimit view_limit_;
   mutable std::once_flag is_integrated_;
-  mutable Eigen::MatrixXd light_integrals_;  // [kMaxShFunctions][kl]
+  mutable Eigen::MatrixXd light_integrals_;
 };
 
 }  // namespace tessera

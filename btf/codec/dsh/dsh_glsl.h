@@ -20,4 +20,8 @@ namespace tessera {
 [[nodiscard]] absl::StatusOr<CodecGlsl> DshGlsl(const BtfelTable& table,
                                                 std::span<const BtfelTable* const> more = {});
 
+// Beside it, for light of `n` harmonics. The source depends on the largest measured polar angle, too. Errors:
+// the same.
+[[nodiscard]] absl::StatusOr<HarmonicsGlsl> DshHarmonicsGlsl(const BtfelTable& table, int n);
+
 }  // namespace tessera

@@ -21,4 +21,10 @@ absl::StatusOr<CodecGlsl> ViewPcaCodec::Glsl(const BtfelTable& table,
   return ViewPcaGlsl(table, more);
 }
 
+absl::StatusOr<HarmonicsGlsl> ViewPcaCodec::GlslOfHarmonics(const BtfelTable& table,
+                                                            std::span<const BtfelTable* const> /*more*/,
+                                                            int n) const {
+  return ViewPcaHarmonicsGlsl(table, n);
+}
+
 }  // namespace tessera

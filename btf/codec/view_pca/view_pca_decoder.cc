@@ -105,8 +105,7 @@ double ViewPcaDecoder::LightScale(const Eigen::Vector3d& light) const {
   return light.z() < lights_.cos_limit() ? light.z() / lights_.cos_limit() : 1.0;
 }
 
-std::vector<LinearForm> ViewPcaDecoder::LightHarmonics(int n, const Eigen::Vector3d& view) const {
-  assert(IsShFunctionCount(n));
+const Eigen::MatrixXd& ViewPcaDecoder::LightIntegrals() const {
   std::call_once(is_integrated_, [this] {
     light_integrals_ = LightHarmonicIntegrals(num_lights_, std::acos(lights_.cos_limit()),
                                               [this](const Eigen::Vector3d& light, std::span<double> values) {
@@ -116,6 +115,11 @@ std::vector<LinearForm> ViewPcaDecoder::LightHarmonics(int n, const Eigen::Vecto
                                                 }
                                               });
   });
+  return light_integrals_;
+}
+
+std::vector<LinearForm> ViewPcaDecoder::LightHarmonics(int n, const Eigen::Vector3d& view) const {
+  assert(IsShFunctionCount(n));
   std::vector<LinearForm> forms(n);
   if (view.z() <= 0.0) {
     return forms;
@@ -123,7 +127,7 @@ std::vector<LinearForm> ViewPcaDecoder::LightHarmonics(int n, const Eigen::Vecto
   std::vector<int> all(num_lights_);
   std::iota(all.begin(), all.end(), 0);
   for (int i = 0; i < n; ++i) {
-    forms[i] = FormOf(all, std::span(light_integrals_.col(i).data(), all.size()), view);
+    forms[i] = FormOf(all, std::span(LightIntegrals().col(i).data(), all.size()), view);
   }
   return forms;
 }

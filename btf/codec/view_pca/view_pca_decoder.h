@@ -42,6 +42,10 @@ class ViewPcaDecoder final : public Decoder {
   // a(view, light, m + 1), [views][lights][c].
   [[nodiscard]] const std::vector<float>& light_weights() const { return light_weights_; }
 
+  // Integrals of the lights' hats, as they decode, with each harmonic, [lights][kMaxShFunctions]. The first
+  // call integrates.
+  [[nodiscard]] const Eigen::MatrixXd& LightIntegrals() const;
+
   [[nodiscard]] LinearForm Form(const Eigen::Vector3d& light, const Eigen::Vector3d& view) const override;
   [[nodiscard]] std::vector<LinearForm> LightHarmonics(int n, const Eigen::Vector3d& view) const override;
 
@@ -62,7 +66,7 @@ class ViewPcaDecoder final : public Decoder {
   HemisphereInterpolator views_;
   std::vector<float> light_weights_;
   mutable std::once_flag is_integrated_;
-  mutable Eigen::MatrixXd light_integrals_;  // [lights][kMaxShFunctions]
+  mutable Eigen::MatrixXd light_integrals_;
 };
 
 }  // namespace tessera

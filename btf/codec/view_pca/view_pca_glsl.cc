@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cstring>
+#include <functional>
 #include <memory>
 #include <span>
 #include <string>
@@ -28,6 +29,7 @@ struct Layout {
   [[nodiscard]] int view_codes() const { return 3 * (c + 1); }
   [[nodiscard]] int view_texels() const { return (view_codes() + 3) / 4; }  // of steps, or of offsets
   [[nodiscard]] int weight_texels() const { return (c + 3) / 4; }
+  [[nodiscard]] int harmonics_texels() const { return (c + 4) / 4; }  // of the mean's weight and the others
   [[nodiscard]] int btfel_view_texels() const { return (view_codes() + kCodesPerTexel - 1) / kCodesPerTexel; }
 };
 
@@ -37,8 +39,11 @@ struct Layout {
 // starts; a triangle is (a, b), (c, 1 / twice its area), (the three indices).
 constexpr int kCellsBegin = 3;
 
-std::string Source(const Layout& layout) {
-  const auto component = [](int i) { return std::string(1, kComponent[i]); };
+std::string Component(int i) {
+  return std::string(1, kComponent[i]);
+}
+
+std::string Head() {
   std::string out = R"(uniform usamplerBuffer btfel_words;
 uniform samplerBuffer codec_values;
 
@@ -89,9 +94,45 @@ void Locate(vec3 d, vec2 limit, int cells, out ivec3 index, out vec3 weight) {
     index = best < before ? ivec3(q.xyz) : index;
   } while (++entry < end && best > 0.0);
 }
+)");
+  return out;
+}
 
+// One of the three measured views around a view: its quantisation times weight_of(n), the weight of the
+// view's code n under the light at hand, then its part in each BTFel's value.
+void AppendView(const Layout& layout, const std::function<std::string(int n)>& weight_of, std::string* out) {
+  absl::StrAppend(out, "    float w[", layout.view_codes(), "];\n    vec3 offset = vec3(0.0);\n",
+                  "    int table = quantisation_begin + v * ", 2 * layout.view_texels(), ";\n");
+  for (int texel = 0; texel < layout.view_texels(); ++texel) {
+    const int end = std::min(4 * texel + 4, layout.view_codes());
+    absl::StrAppend(out, "    q = texelFetch(codec_values, table + ", texel, ");\n");
+    for (int n = 4 * texel; n < end; ++n) {
+      absl::StrAppend(out, "    w[", n, "] = q.", Component(n % 4), " * ", weight_of(n), ";\n");
+    }
+    absl::StrAppend(out, "    q = texelFetch(codec_values, table + ", layout.view_texels() + texel, ");\n");
+    for (int n = 4 * texel; n < end; ++n) {
+      absl::StrAppend(out, "    offset.", Component(n / (layout.c + 1)), " += q.", Component(n % 4), " * ",
+                      weight_of(n), ";\n");
+    }
+  }
+  absl::StrAppend(out, "    do {\n      int first = (btfels[n] * num_views + v) * ",
+                  layout.btfel_view_texels(), ";\n      vec3 value = offset;\n      uvec4 u;\n");
+  for (int n = 0; n < layout.view_codes(); ++n) {
+    if (n % kCodesPerTexel == 0) {
+      absl::StrAppend(out, "      u = texelFetch(btfel_words, first + ", n / kCodesPerTexel, ");\n");
+    }
+    absl::StrAppend(out, "      value.", Component(n / (layout.c + 1)), " += float(int(u.",
+                    Component(n % kCodesPerTexel / 4), " >> ", 8 * (n % 4), ") & 255) * w[", n, "];\n");
+  }
+  absl::StrAppend(out, R"(      sum += (weights[n] * view_weight[s]) * value;
+    } while (++n < count);
+)");
+}
+
+std::string Source(const Layout& layout) {
+  std::string out = absl::StrCat(Head(), kUnturnedDirectionGlsl, kDirectionIncidenceGlsl, R"(
 // BTFels of no turn.
-vec3 BlendUnturned(ivec4 btfels, vec4 weights, int count, vec3 light, vec3 view) {
+vec3 BlendUnturned(ivec4 btfels, vec4 weights, int count, Incidence light, vec3 view) {
   vec4 limits = texelFetch(codec_values, 0);
   vec4 q = texelFetch(codec_values, 1);
   int num_lights = int(q.z), num_views = int(q.w);
@@ -109,52 +150,70 @@ vec3 BlendUnturned(ivec4 btfels, vec4 weights, int count, vec3 light, vec3 view)
     int v = view_index[s];
     int n = 0;
 )");
-  // The weights of the mean and the eigen-textures under this light, then times the steps.
-  absl::StrAppend(&out, "    float w[", layout.view_codes(), "];\n    vec3 offset = vec3(0.0);\n    vec4 ",
-                  "a[", std::max(1, layout.weight_texels()), "];\n");
+  // The weights of the eigen-textures under this light; that of the mean is 1.
+  absl::StrAppend(&out, "    vec4 a[", std::max(1, layout.weight_texels()), "];\n");
   absl::StrAppend(&out, "    int row = weights_begin + v * num_lights * ", layout.weight_texels(), ";\n");
   for (int t = 0; t < layout.weight_texels(); ++t) {
     absl::StrAppend(&out, "    a[", t, "] = ");
     for (int r = 0; r < 3; ++r) {
-      absl::StrAppend(&out, r > 0 ? " + " : "", "light_weight.", component(r),
-                      " * texelFetch(codec_values, row + light_index.", component(r), " * ",
+      absl::StrAppend(&out, r > 0 ? " + " : "", "light_weight.", Component(r),
+                      " * texelFetch(codec_values, row + light_index.", Component(r), " * ",
                       layout.weight_texels(), " + ", t, ")");
     }
     absl::StrAppend(&out, ";\n");
   }
-  const auto weight_of = [&](int n) {
-    const int m = n % (layout.c + 1);
-    return m == 0 ? std::string("1.0") : absl::StrCat("a[", (m - 1) / 4, "].", component((m - 1) % 4));
-  };
-  absl::StrAppend(&out, "    int table = quantisation_begin + v * ", 2 * layout.view_texels(), ";\n");
-  for (int texel = 0; texel < layout.view_texels(); ++texel) {
-    const int end = std::min(4 * texel + 4, layout.view_codes());
-    absl::StrAppend(&out, "    q = texelFetch(codec_values, table + ", texel, ");\n");
-    for (int n = 4 * texel; n < end; ++n) {
-      absl::StrAppend(&out, "    w[", n, "] = q.", component(n % 4), " * ", weight_of(n), ";\n");
-    }
-    absl::StrAppend(&out, "    q = texelFetch(codec_values, table + ", layout.view_texels() + texel, ");\n");
-    for (int n = 4 * texel; n < end; ++n) {
-      absl::StrAppend(&out, "    offset.", component(n / (layout.c + 1)), " += q.", component(n % 4), " * ",
-                      weight_of(n), ";\n");
-    }
-  }
-  absl::StrAppend(&out, "    do {\n      int first = (btfels[n] * num_views + v) * ",
-                  layout.btfel_view_texels(), ";\n      vec3 value = offset;\n      uvec4 u;\n");
-  for (int n = 0; n < layout.view_codes(); ++n) {
-    if (n % kCodesPerTexel == 0) {
-      absl::StrAppend(&out, "      u = texelFetch(btfel_words, first + ", n / kCodesPerTexel, ");\n");
-    }
-    absl::StrAppend(&out, "      value.", component(n / (layout.c + 1)), " += float(int(u.",
-                    component(n % kCodesPerTexel / 4), " >> ", 8 * (n % 4), ") & 255) * w[", n, "];\n");
-  }
-  absl::StrAppend(&out, R"(      sum += (weights[n] * view_weight[s]) * value;
-    } while (++n < count);
-  } while (++s < corners);
-  return is_lit ? scale * sum : vec3(0.0);
+  AppendView(
+      layout,
+      [&](int n) {
+        const int m = n % (layout.c + 1);
+        return m == 0 ? std::string("1.0") : absl::StrCat("a[", (m - 1) / 4, "].", Component((m - 1) % 4));
+      },
+      &out);
+  absl::StrAppend(&out, "  } while (++s < corners);\n  return is_lit ? scale * sum : vec3(0.0);\n}\n",
+                  kBlendByTurnGlsl);
+  return out;
 }
-)",
-                  kUnturnedDirectionGlsl, kBlendByTurnGlsl);
+
+std::string SourceOfHarmonics(const Layout& layout, int n) {
+  std::string out = absl::StrCat(Head(), "uniform samplerBuffer harmonics_values;\n", kUnturnedDirectionGlsl,
+                                 HarmonicsIncidenceGlsl(n), R"(
+// BTFels of no turn.
+vec3 BlendUnturned(ivec4 btfels, vec4 weights, int count, Incidence light, vec3 view) {
+  vec4 limits = texelFetch(codec_values, 0);
+  vec4 q = texelFetch(codec_values, 1);
+  int num_views = int(q.w);
+  ivec3 view_index;
+  vec3 view_weight;
+  Locate(view, limits.zw, int(q.y), view_index, view_weight);
+  int quantisation_begin = int(texelFetch(codec_values, 2).y);
+  bool is_lit = view.z > 0.0;
+  int corners = is_lit ? 3 : 1, s = 0;
+  vec3 sum = vec3(0.0);
+  do {
+    int v = view_index[s];
+    int n = 0;
+)");
+  // The weights of the mean and the eigen-textures under this light, for each channel.
+  absl::StrAppend(&out, "    vec3 a[", layout.c + 1, "];\n    int row = v * ", n * layout.harmonics_texels(),
+                  ";\n");
+  for (int i = 0; i < n; ++i) {
+    for (int m = 0; m <= layout.c; ++m) {
+      if (m % 4 == 0) {
+        absl::StrAppend(&out, "    q = texelFetch(harmonics_values, row + ",
+                        i * layout.harmonics_texels() + m / 4, ");\n");
+      }
+      absl::StrAppend(&out, "    a[", m, "] ", i == 0 ? "" : "+", "= q.", Component(m % 4), " * light[", i,
+                      "];\n");
+    }
+  }
+  AppendView(
+      layout,
+      [&](int code) {
+        return absl::StrCat("a[", code % (layout.c + 1), "].", Component(code / (layout.c + 1)));
+      },
+      &out);
+  absl::StrAppend(&out, "  } while (++s < corners);\n  return is_lit ? sum : vec3(0.0);\n}\n",
+                  kBlendByTurnGlsl);
   return out;
 }
 
@@ -247,6 +306,30 @@ absl::StatusOr<CodecGlsl> ViewPcaGlsl(const BtfelTable& table, std::span<const B
   uint32_t* words = PackBtfels(table, layout, glsl.btfel_words.data());
   for (const BtfelTable* const other : more) {
     words = PackBtfels(*other, layout, words);
+  }
+  return glsl;
+}
+
+absl::StatusOr<HarmonicsGlsl> ViewPcaHarmonicsGlsl(const BtfelTable& table, int n) {
+  TESSERA_ASSIGN_OR_RETURN(const std::unique_ptr<ViewPcaDecoder> decoder, ViewPcaDecoder::Create(table));
+  const Layout layout{decoder->num_eigen_textures()};
+  HarmonicsGlsl glsl{.source = SourceOfHarmonics(layout, n)};
+  const Eigen::MatrixXd integrals = decoder->LightIntegrals().leftCols(n);
+  const int num_lights = decoder->num_lights();
+  const size_t row_floats = 4 * static_cast<size_t>(layout.harmonics_texels());
+  glsl.values.assign(decoder->num_views() * n * row_floats, 0.0F);
+  float* row = glsl.values.data();
+  for (int view = 0; view < decoder->num_views(); ++view) {
+    const Eigen::Map<const Eigen::MatrixXf> weights(
+        decoder->light_weights().data() + static_cast<size_t>(view) * num_lights * layout.c, layout.c,
+        num_lights);
+    const Eigen::MatrixXd under = weights.cast<double>() * integrals;
+    for (int i = 0; i < n; ++i, row += row_floats) {
+      row[0] = static_cast<float>(integrals.col(i).sum());
+      for (int m = 0; m < layout.c; ++m) {
+        row[m + 1] = static_cast<float>(under(m, i));
+      }
+    }
   }
   return glsl;
 }

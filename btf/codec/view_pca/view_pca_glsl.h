@@ -16,4 +16,7 @@ namespace tessera {
 [[nodiscard]] absl::StatusOr<CodecGlsl> ViewPcaGlsl(const BtfelTable& table,
                                                     std::span<const BtfelTable* const> more = {});
 
+// Beside it, for light of `n` harmonics. Errors: INVALID_ARGUMENT as ViewPcaDecoder::Create.
+[[nodiscard]] absl::StatusOr<HarmonicsGlsl> ViewPcaHarmonicsGlsl(const BtfelTable& table, int n);
+
 }  // namespace tessera

@@ -265,7 +265,7 @@ TEST(FrequencyLightEquationTest, OneVectorOfLightServesEveryView) {
   const FrequencyLight light =
       *FrequencyLight::Create(EnvironmentOf(EnvironmentLayout::kEquirect, 8, SunnySky), 25);
   const Eigen::MatrixXd in_frame = light.InFrame(Frames()[5]);
-  const Eigen::MatrixXd vectors = DshLightMatrix(*decoder).leftCols(25) * in_frame;
+  const Eigen::MatrixXd vectors = decoder->LightIntegrals().leftCols(25) * in_frame;
   ASSERT_EQ(vectors.rows(), 16);
   for (const Eigen::Vector3d& view : Views()) {
     Eigen::VectorXd view_weights(9);

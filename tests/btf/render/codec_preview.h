@@ -5,11 +5,24 @@
 
 #include <gtest/gtest.h>
 
+#include "btf/base/rng.h"
+#include "btf/light/frequency_light.h"
 #include "btf/render/preview.h"
 #include "btf/render/reference.h"
 #include "tests/btf/render/hand_made.h"
 
 namespace tessera::testing {
+
+// Brighter than dark in every direction.
+inline FrequencyLight RandomFrequencyLight(int n, uint64_t seed) {
+  Rng rng(seed);
+  Eigen::MatrixXd coefficients(n, 3);
+  for (Eigen::Index i = 0; i < coefficients.size(); ++i) {
+    coefficients.data()[i] = 0.5 * rng.NextDouble() - 0.25;
+  }
+  coefficients.row(0).setConstant(3.0);
+  return FrequencyLight(coefficients);
+}
 
 inline void ExpectPreviewsAsTheReferenceDoes(BtfelTable table) {
   const Dressing dressing = RandomDressing(SkewedGrid(4, 0.3, 7), 8);
@@ -36,8 +49,15 @@ inline void ExpectPreviewsAsTheReferenceDoes(BtfelTable table) {
     scene.filter = filter;
     expect();
   }
-  // From so far that most levels are seen.
+  // Under light from all around, with a light and alone.
+  const FrequencyLight sky = testing::RandomFrequencyLight(25, 5);
+  scene.frequency_light = &sky;
   scene.filter = Filter::kBilinear;
+  expect();
+  const std::vector<Light> lights = std::exchange(scene.lights, {});
+  expect();
+  scene.lights = lights;
+  // From so far that most levels are seen.
   scene.mips = &*mips;
   scene.lights.pop_back();
   scene.width = 48;

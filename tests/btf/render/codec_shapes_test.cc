@@ -15,6 +15,7 @@
 #include "btf/render/reference.h"
 #include "btf/wang/shapes.h"
 #include "tests/btf/codec/synthetic_btf.h"
+#include "tests/btf/render/codec_preview.h"
 #include "tests/btf/render/hand_made.h"
 
 namespace tessera {
@@ -78,6 +79,14 @@ TEST_P(CodecShapesTest, GlMatchesTheReference) {
     scene.camera = orbit(50.0, 12.0, 0.5);
     ExpectAgreement(**context, scene);
     scene.mips = &*mips;
+    ExpectAgreement(**context, scene);
+    // Under light from all around, which harmonics of every order make, alone and beside the others.
+    const FrequencyLight sky = testing::RandomFrequencyLight(16, 7);
+    scene.frequency_light = &sky;
+    ExpectAgreement(**context, scene);
+    scene.mips = nullptr;
+    scene.lights.clear();
+    scene.camera = orbit(-20.0, 60.0, 0.35);
     ExpectAgreement(**context, scene);
   }
 }
