@@ -6,6 +6,7 @@
 #include <memory>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include <absl/strings/str_cat.h>
 
@@ -42,7 +43,7 @@ absl::StatusOr<EnvironmentLayout> LayoutOf(const Image& image, const std::string
   }
   return absl::InvalidArgumentError(
       absl::StrCat(name, ": ", image.width, "x", image.height,
-                   " texels is neither 2:1 (equirectangular) nor 1:1 (angular map): name the layout"));
+                   " texels, expected 2:1 (equirectangular) or 1:1 (angular map)"));
 }
 
 absl::Status CheckOptions(const std::string& name, const EnvironmentOptions& options) {
@@ -165,6 +166,40 @@ Eigen::Array3d Environment::Radiance(const Eigen::Vector3d& direction) const {
   return sum / weights;
 }
 
+Environment Reduced(const Environment& environment, int height) {
+  const TexelGrid coarse(EnvironmentLayout::kEquirect, 2 * height, height);
+  const TexelGrid& fine = environment.grid();
+  std::vector<Eigen::Array4d> sums(static_cast<size_t>(coarse.width()) * height, Eigen::Array4d::Zero());
+  for (int y = 0; y < fine.height(); ++y) {
+    for (int x = 0; x < fine.width(); ++x) {
+      const Eigen::Vector2d place = coarse.Place(fine.Direction(x, y));
+      const int column = std::min(static_cast<int>(place.x()), coarse.width() - 1);
+      const int row = std::min(static_cast<int>(place.y()), height - 1);
+      const double solid_angle = fine.SolidAngle(x, y);
+      Eigen::Array4d& sum = sums[static_cast<size_t>(row) * coarse.width() + column];
+      sum.head<3>() += solid_angle * environment.TexelRadiance(x, y);
+      sum[3] += solid_angle;
+    }
+  }
+  Image image(coarse.width(), height, 3);
+  for (int y = 0; y < height; ++y) {
+    for (int x = 0; x < coarse.width(); ++x) {
+      const Eigen::Array4d& sum = sums[static_cast<size_t>(y) * coarse.width() + x];
+      const Eigen::Array3d radiance =
+          sum[3] > 0.0 ? Eigen::Array3d(sum.head<3>() / sum[3])
+                       : environment.Radiance(environment.world_from_picture() * coarse.Direction(x, y));
+      for (int channel = 0; channel < 3; ++channel) {
+        image.at(x, y)[channel] = static_cast<float>(radiance[channel] / environment.scale());
+      }
+    }
+  }
+  // What is finite and not negative stays so.
+  return *Environment::Create(image, "reduced",
+                              {.layout = EnvironmentLayout::kEquirect,
+                               .rotation_rad = environment.rotation_rad(),
+                               .scale = environment.scale()});
+}
+
 absl::StatusOr<Environment> ReadEnvironment(const std::filesystem::path& path,
                                             const EnvironmentOptions& options) {
   TESSERA_ASSIGN_OR_RETURN(std::unique_ptr<ByteStream> stream, OpenFileStream(path));
@@ -174,6 +209,16 @@ absl::StatusOr<Environment> ReadEnvironment(const std::filesystem::path& path,
       CheckEnvironmentSize(path.string(), reader->header().width, reader->header().height));
   TESSERA_ASSIGN_OR_RETURN(const Image image, ReadImage(path, std::nullopt));
   return Environment::Create(image, path.string(), options);
+}
+
+absl::StatusOr<Environment> DecodeEnvironment(std::span<const std::byte> bytes, std::string_view name,
+                                              const EnvironmentOptions& options) {
+  TESSERA_ASSIGN_OR_RETURN(const std::unique_ptr<ImageReader> reader,
+                           OpenImage(MakeMemoryStream(bytes), name, {}));
+  TESSERA_RETURN_IF_ERROR(
+      CheckEnvironmentSize(std::string(name), reader->header().width, reader->header().height));
+  TESSERA_ASSIGN_OR_RETURN(const Image image, DecodeImage(bytes, name, std::nullopt));
+  return Environment::Create(image, name, options);
 }
 
 }  // namespace tessera

@@ -8,8 +8,10 @@
 // a background, it is interpolated between texel centres.
 #pragma once
 
+#include <cstddef>
 #include <filesystem>
 #include <optional>
+#include <span>
 #include <string_view>
 
 #include <absl/status/status.h>
@@ -74,10 +76,19 @@ class Environment {
   Eigen::Array3d power_;
 };
 
+// As an equirectangular picture of 2 height x height texels, each the mean, by solid angle, of the texels
+// whose centres lie in it; one that holds none takes what is interpolated at its centre. Power changes by
+// what texels across edges make.
+[[nodiscard]] Environment Reduced(const Environment& environment, int height);
+
 // A Radiance (.hdr) or OpenEXR picture, or any other that image/image_io.h reads, told by its first bytes.
 // Errors: those of ReadImage and Environment::Create; more than kMaxEnvironmentTexels are refused before they
 // are read.
 [[nodiscard]] absl::StatusOr<Environment> ReadEnvironment(const std::filesystem::path& path,
                                                           const EnvironmentOptions& options);
+// The same from a file's bytes.
+[[nodiscard]] absl::StatusOr<Environment> DecodeEnvironment(std::span<const std::byte> bytes,
+                                                            std::string_view name,
+                                                            const EnvironmentOptions& options);
 
 }  // namespace tessera

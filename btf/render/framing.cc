@@ -6,6 +6,7 @@
 #include <Eigen/Geometry>
 
 #include "btf/base/status_macros.h"
+#include "btf/light/q2_tree.h"
 #include "btf/render/preview.h"
 #include "btf/render/preview_scene.h"
 
@@ -116,6 +117,14 @@ Light LightTurnedAbout(const Light& light, const Eigen::Vector3d& centre, double
   turned.place = light.kind == Light::Kind::kPoint ? Eigen::Vector3d(centre + turn * (light.place - centre))
                                                    : Eigen::Vector3d(turn * light.place);
   return turned;
+}
+
+std::vector<Light> DirectionalLights(std::span<const EnvironmentLight> lights) {
+  std::vector<Light> directional;
+  for (const EnvironmentLight& light : lights) {
+    directional.push_back({.place = light.direction, .irradiance = light.irradiance.matrix()});
+  }
+  return directional;
 }
 
 double TexelsPerPixel(const PreviewScene& scene) {

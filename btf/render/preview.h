@@ -7,6 +7,7 @@
 
 #include <memory>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include <absl/status/statusor.h>
@@ -22,6 +23,7 @@
 namespace tessera {
 
 class FrequencyLight;
+struct EnvironmentLight;
 class OffscreenContext;
 
 // The eye looks at the target; `up` points upwards in the picture, perpendicular or not.
@@ -125,6 +127,9 @@ class GlPreview {
 // not be in use by another thread. For a single picture: GlPreview draws further ones faster.
 [[nodiscard]] absl::StatusOr<Image> RenderGl(OffscreenContext& context, const PreviewScene& scene,
                                              const RunContext& run_context);
+
+// Lights of an environment (light/q2_tree.h) as lights of a scene.
+[[nodiscard]] std::vector<Light> DirectionalLights(std::span<const EnvironmentLight> lights);
 
 // How many texels of the tile set lie along the side of a pixel, on the mean over the faces that look at the
 // eye, hidden or not; 0 where none does. The scene as RenderGl wants it. Above about 2 mip levels show less

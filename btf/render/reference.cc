@@ -194,12 +194,39 @@ struct Shaded {
   uint64_t lit = 0;
 };
 
+// An environment's texels that are not black.
+struct TexelLights {
+  explicit TexelLights(const ReferenceEnvironment& reference) : negative_values(reference.negative_values) {
+    if (reference.environment == nullptr) {
+      return;
+    }
+    const Environment& environment = *reference.environment;
+    for (int y = 0; y < environment.grid().height(); ++y) {
+      for (int x = 0; x < environment.grid().width(); ++x) {
+        const Eigen::Array3d irradiance =
+            environment.TexelRadiance(x, y) * environment.grid().SolidAngle(x, y);
+        if (irradiance.maxCoeff() > 0.0) {
+          lights.push_back({.place = environment.TexelDirection(x, y), .irradiance = irradiance.matrix()});
+        }
+      }
+    }
+  }
+
+  std::vector<Light> lights;
+  NegativeValues negative_values;
+};
+
 class Shader {
  public:
   // `visibility` is none where the scene has no shadows.
   Shader(const PreviewScene& scene, const DressedSurface& surface, const Decoder& decoder,
-         const ViewFrame& view, const Visibility* visibility)
-      : scene_(scene), surface_(surface), decoder_(decoder), view_(view), visibility_(visibility) {}
+         const ViewFrame& view, const Visibility* visibility, const TexelLights& texels)
+      : scene_(scene),
+        surface_(surface),
+        decoder_(decoder),
+        view_(view),
+        visibility_(visibility),
+        texels_(texels) {}
 
   // Of one group's samples, all on the front of one face.
   [[nodiscard]] Shaded Shade(std::span<const SurfacePoint> samples) const {
@@ -228,6 +255,7 @@ class Shader {
     }
     const SurfaceFrame frame = surface_.FrameAt(mean);
     const Eigen::Vector3d to_eye = (scene_.camera.eye - frame.position).normalized();
+    const BlendedTaps blend(surface_, taps);
     Shaded shaded;
     for (size_t i = 0; i < scene_.lights.size(); ++i) {
       const Light& light = scene_.lights[i];
@@ -241,16 +269,32 @@ class Shader {
         to_light -= frame.position;
         falloff = 1.0 / std::max(to_light.squaredNorm(), 1e-24);
       }
-      shaded.radiance += ReflectanceOfTaps(surface_, decoder_, frame, taps, to_light.normalized(), to_eye) *
+      shaded.radiance += ReflectanceOfTaps(blend, decoder_, frame, to_light.normalized(), to_eye).max(0.0) *
                          light.irradiance.array() * (falloff / kPi);
     }
+    shaded.radiance += UnderTexels(blend, mean, frame, to_eye);
     if (scene_.frequency_light != nullptr) {
-      shaded.radiance += RadianceOfTaps(surface_, decoder_, frame, taps, *scene_.frequency_light, to_eye);
+      shaded.radiance += RadianceOfTaps(blend, decoder_, frame, *scene_.frequency_light, to_eye).max(0.0);
     }
     return shaded;
   }
 
  private:
+  [[nodiscard]] Eigen::Array3d UnderTexels(const BlendedTaps& taps, const SurfacePoint& point,
+                                           const SurfaceFrame& frame, const Eigen::Vector3d& to_eye) const {
+    Eigen::Array3d sum = Eigen::Array3d::Zero();
+    for (const Light& texel : texels_.lights) {
+      if (frame.n.dot(texel.place) <= 0.0 ||
+          (visibility_ != nullptr && !visibility_->Reaches(texel, point, frame.n))) {
+        continue;
+      }
+      const Eigen::Array3d value = ReflectanceOfTaps(taps, decoder_, frame, texel.place, to_eye);
+      sum += (texels_.negative_values == NegativeValues::kClamp ? value.max(0.0) : value) *
+             texel.irradiance.array() / kPi;
+    }
+    return texels_.negative_values == NegativeValues::kClamp ? sum : sum.max(0.0);
+  }
+
   // The mip level that shows a pixel's share of the surface as about one texel; infinite edge on.
   [[nodiscard]] double LevelAt(const SurfacePoint& point) const {
     const Eigen::Vector3d from_eye = surface_.PositionAt(point) - view_.eye;
@@ -277,6 +321,7 @@ class Shader {
   const Decoder& decoder_;
   const ViewFrame& view_;
   const Visibility* visibility_;
+  const TexelLights& texels_;
 };
 
 // One pixel from its samples.
@@ -318,7 +363,8 @@ void ShadePixel(const Shader& shader, std::span<const Hit> samples, size_t pixel
 }  // namespace
 
 absl::StatusOr<ReferencePicture> RenderReferenceWithDepth(const PreviewScene& scene,
-                                                          const RunContext& context) {
+                                                          const RunContext& context,
+                                                          const ReferenceEnvironment& environment) {
   TESSERA_RETURN_IF_ERROR(CheckScene(scene));
   TESSERA_ASSIGN_OR_RETURN(const DressedSurface surface,
                            DressedSurface::Create(*scene.dressing, *scene.tile_set, scene.mips));
@@ -332,7 +378,9 @@ absl::StatusOr<ReferencePicture> RenderReferenceWithDepth(const PreviewScene& sc
     TESSERA_ASSIGN_OR_RETURN(occlusion, Occlusion::Create(triangles));
     visibility.emplace(scene, triangles, *occlusion);
   }
-  const Shader shader(scene, surface, *decoder, view, visibility.has_value() ? &*visibility : nullptr);
+  const TexelLights texels(environment);
+  const Shader shader(scene, surface, *decoder, view, visibility.has_value() ? &*visibility : nullptr,
+                      texels);
 
   ReferencePicture picture;
   picture.image = Image(scene.width, scene.height, 4);
@@ -347,7 +395,8 @@ absl::StatusOr<ReferencePicture> RenderReferenceWithDepth(const PreviewScene& sc
       DrawTriangle(triangles, i, rays, view, scene.width, static_cast<int>(begin), static_cast<int>(end) - 1,
                    &hits);
     }
-    for (int64_t pixel = begin * scene.width; pixel < end * scene.width; ++pixel) {
+    for (int64_t pixel = begin * scene.width; pixel < end * scene.width && context.CheckStop().ok();
+         ++pixel) {
       const std::span<const Hit> samples(hits.data() + pixel * kSamplesPerPixel, kSamplesPerPixel);
       ShadePixel(shader, samples, static_cast<size_t>(pixel), picture);
     }

@@ -6,6 +6,8 @@
 
 #include <absl/status/statusor.h>
 
+#include "btf/light/environment.h"
+#include "btf/light/environment_reference.h"
 #include "btf/render/preview.h"
 
 namespace tessera {
@@ -22,8 +24,15 @@ struct ReferencePicture {
   std::vector<uint64_t> lit_everywhere;
 };
 
-// Errors as RenderReference.
-[[nodiscard]] absl::StatusOr<ReferencePicture> RenderReferenceWithDepth(const PreviewScene& scene,
-                                                                        const RunContext& context);
+// Light from all around beside the scene's lights, by brute force: each texel is a directional light from its
+// centre, of its radiance times its solid angle, shadowed as the scene's lights are.
+struct ReferenceEnvironment {
+  const Environment* environment = nullptr;  // or none
+  NegativeValues negative_values = NegativeValues::kClamp;
+};
+
+// Errors as RenderReference. Cost: with an environment, a decode for each pixel and texel above its horizon.
+[[nodiscard]] absl::StatusOr<ReferencePicture> RenderReferenceWithDepth(
+    const PreviewScene& scene, const RunContext& context, const ReferenceEnvironment& environment = {});
 
 }  // namespace tessera

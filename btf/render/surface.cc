@@ -82,39 +82,6 @@ absl::Status CheckMips(const TileSet& tile_set, const TileMips& mips) {
   return absl::OkStatus();
 }
 
-Eigen::Vector3d LiftedView(Eigen::Vector3d view) {
-  if (view.z() < kLeastViewCosine) {
-    view.z() = kLeastViewCosine;
-    view.normalize();
-  }
-  return view;
-}
-
-// The taps' values by their weights; `form_of` makes the form of BTFels of some turns.
-template <typename FormOf>
-Eigen::Array3d SumOfTaps(const DressedSurface& surface, const Decoder& decoder, std::span<const Tap> taps,
-                         const FormOf& form_of) {
-  Eigen::Array3d sum = Eigen::Array3d::Zero();
-  std::vector<double> coefficients(decoder.num_coefficients());
-  std::array<std::optional<LinearForm>, 4> forms;  // by turns
-  for (const Tap& tap : taps) {
-    if (tap.weight > 0.0) {
-      const BtfelTable& table = surface.btfels(tap.level);
-      const std::span<const uint8_t> codes = table.btfel(tap.btfel);
-      for (size_t i = 0; i < coefficients.size(); ++i) {
-        coefficients[i] =
-            static_cast<double>(table.offset[i]) + static_cast<double>(table.step[i]) * codes[i];
-      }
-      std::optional<LinearForm>& form = forms[tap.turns];
-      if (!form.has_value()) {
-        form = form_of(tap.turns);
-      }
-      sum += tap.weight * form->ValueOf(coefficients);
-    }
-  }
-  return sum.max(0.0);
-}
-
 }  // namespace
 
 absl::StatusOr<DressedSurface> DressedSurface::Create(const Dressing& dressing, const TileSet& tile_set,
@@ -333,25 +300,56 @@ Tap DressedSurface::NearestTap(const SurfacePoint& point) const {
   return TapOf(TexelAt(point.face, x, y, w));
 }
 
-Eigen::Array3d ReflectanceOfTaps(const DressedSurface& surface, const Decoder& decoder,
-                                 const SurfaceFrame& frame, std::span<const Tap> taps,
+BlendedTaps::BlendedTaps(const DressedSurface& surface, std::span<const Tap> taps) {
+  for (const Tap& tap : taps) {
+    if (tap.weight > 0.0) {
+      const BtfelTable& table = surface.btfels(tap.level);
+      const std::span<const uint8_t> codes = table.btfel(tap.btfel);
+      std::vector<double>& sum = coefficients_[tap.turns];
+      sum.resize(codes.size(), 0.0);
+      for (size_t i = 0; i < codes.size(); ++i) {
+        sum[i] += tap.weight *
+                  (static_cast<double>(table.offset[i]) + static_cast<double>(table.step[i]) * codes[i]);
+      }
+    }
+  }
+}
+
+Eigen::Array3d BlendedTaps::ValueOf(const std::function<LinearForm(int turns)>& form_of) const {
+  Eigen::Array3d sum = Eigen::Array3d::Zero();
+  for (int turns = 0; turns < 4; ++turns) {
+    if (!coefficients_[turns].empty()) {
+      sum += form_of(turns).ValueOf(coefficients_[turns]);
+    }
+  }
+  return sum;
+}
+
+Eigen::Vector3d LocalView(const SurfaceFrame& frame, const Eigen::Vector3d& to_eye) {
+  Eigen::Vector3d view = frame.LocalFromWorld(to_eye);
+  if (view.z() < kLeastViewCosine) {
+    view.z() = kLeastViewCosine;
+    view.normalize();
+  }
+  return view;
+}
+
+Eigen::Array3d ReflectanceOfTaps(const BlendedTaps& taps, const Decoder& decoder, const SurfaceFrame& frame,
                                  const Eigen::Vector3d& to_light, const Eigen::Vector3d& to_eye) {
   const Eigen::Vector3d light = frame.LocalFromWorld(to_light);
-  const Eigen::Vector3d view = LiftedView(frame.LocalFromWorld(to_eye));
-  return SumOfTaps(surface, decoder, taps, [&](int turns) {
+  const Eigen::Vector3d view = LocalView(frame, to_eye);
+  return taps.ValueOf([&](int turns) {
     return decoder.Form(UnturnedFromTurned(light, turns), UnturnedFromTurned(view, turns));
   });
 }
 
-Eigen::Array3d RadianceOfTaps(const DressedSurface& surface, const Decoder& decoder,
-                              const SurfaceFrame& frame, std::span<const Tap> taps,
+Eigen::Array3d RadianceOfTaps(const BlendedTaps& taps, const Decoder& decoder, const SurfaceFrame& frame,
                               const FrequencyLight& light, const Eigen::Vector3d& to_eye) {
   Eigen::Matrix3d local_from_world;
   local_from_world << frame.t.transpose(), frame.b.transpose(), frame.n.transpose();
   const Eigen::MatrixXd in_frame = light.InFrame(local_from_world);
-  const Eigen::Vector3d view = LiftedView(frame.LocalFromWorld(to_eye));
-  return SumOfTaps(surface, decoder, taps,
-                   [&](int turns) { return RadianceForm(decoder, view, in_frame, turns); });
+  const Eigen::Vector3d view = LocalView(frame, to_eye);
+  return taps.ValueOf([&](int turns) { return RadianceForm(decoder, view, in_frame, turns); });
 }
 
 }  // namespace tessera

@@ -9,6 +9,7 @@
 #pragma once
 
 #include <array>
+#include <functional>
 #include <span>
 #include <vector>
 
@@ -127,16 +128,30 @@ class DressedSurface {
   std::vector<std::array<TileNeighbour, 4>> neighbours_;  // [face][tile side]
 };
 
-// Reflectance >= 0 that the taps show in `frame` under unit world directions; a view below the horizon is
-// lifted to kLeastViewCosine.
-[[nodiscard]] Eigen::Array3d ReflectanceOfTaps(const DressedSurface& surface, const Decoder& decoder,
-                                               const SurfaceFrame& frame, std::span<const Tap> taps,
-                                               const Eigen::Vector3d& to_light,
+// The taps' BTFels, blended by their weights apart for each number of quarter turns: what they show under any
+// light is linear in these.
+class BlendedTaps {
+ public:
+  BlendedTaps(const DressedSurface& surface, std::span<const Tap> taps);
+
+  // Values before the clamp at 0; `form_of` makes the form of BTFels of some turns.
+  [[nodiscard]] Eigen::Array3d ValueOf(const std::function<LinearForm(int turns)>& form_of) const;
+
+ private:
+  std::array<std::vector<double>, 4> coefficients_;  // empty where no tap has these turns
+};
+
+// A view below the horizon is lifted to kLeastViewCosine.
+[[nodiscard]] Eigen::Vector3d LocalView(const SurfaceFrame& frame, const Eigen::Vector3d& to_eye);
+
+// Reflectance, before the clamp at 0, of the taps in `frame` under unit world directions.
+[[nodiscard]] Eigen::Array3d ReflectanceOfTaps(const BlendedTaps& taps, const Decoder& decoder,
+                                               const SurfaceFrame& frame, const Eigen::Vector3d& to_light,
                                                const Eigen::Vector3d& to_eye);
 
-// Radiance >= 0 of the taps under light from all around, as RadianceForm has it; the view as above.
-[[nodiscard]] Eigen::Array3d RadianceOfTaps(const DressedSurface& surface, const Decoder& decoder,
-                                            const SurfaceFrame& frame, std::span<const Tap> taps,
-                                            const FrequencyLight& light, const Eigen::Vector3d& to_eye);
+// Radiance, before the clamp at 0, of the taps under light from all around, as RadianceForm has it.
+[[nodiscard]] Eigen::Array3d RadianceOfTaps(const BlendedTaps& taps, const Decoder& decoder,
+                                            const SurfaceFrame& frame, const FrequencyLight& light,
+                                            const Eigen::Vector3d& to_eye);
 
 }  // namespace tessera

@@ -1,4 +1,4 @@
-// tessera chart codecs | synthesis
+// tessera chart codecs | synthesis | lighting
 #include <algorithm>
 #include <cctype>
 #include <filesystem>
@@ -11,10 +11,12 @@
 #include "btf/base/atomic_file.h"
 #include "btf/base/status_macros.h"
 #include "btf/chart/codec_chart.h"
+#include "btf/chart/lighting_chart.h"
 #include "btf/chart/synthesis_chart.h"
 #include "btf/data/half_btf.h"
 #include "btf/data/import.h"
 #include "btf/image/image_io.h"
+#include "btf/light/generated_environment.h"
 #include "btf/meso/generated_source.h"
 #include "btf/render/offscreen_context.h"
 #include "client/cli/commands.h"
@@ -33,6 +35,7 @@ struct ChartFlags {
   bool quick = false;
   bool paper = false;
   bool paper_largest = false;
+  std::vector<std::string> environments;  // of lighting
 };
 
 // A generated source is traced once; the chart reads it dozens of times.
@@ -155,7 +158,7 @@ std::string SummaryOf(const std::vector<PaperRow>& rows) {
   return TextTable(table);
 }
 
-// What both charts do before they measure: the sources are told apart, the folder exists.
+// What all charts do before they measure: the sources are told apart, the folder exists.
 absl::Status Prepare(const ChartFlags& flags, const char* command) {
   if (flags.sources.empty() && !flags.paper && !flags.paper_largest) {
     return UsageError(fmt::format("{}: no SOURCE, and neither --paper nor --paper-largest", command));
@@ -330,9 +333,74 @@ absl::Status RunSynthesis(Session& session, const ChartFlags& flags) {
   return absl::OkStatus();
 }
 
-// The options that both charts have.
-std::shared_ptr<ChartFlags> AddChart(CLI::App& command, const char* files, const char* quick,
-                                     const char* paper, const char* paper_largest) {
+std::string SummaryOf(const LightingChart& chart) {
+  std::vector<std::vector<std::string>> table = {
+      {"ENVIRONMENT", "METHOD", "COUNT", "MS", "BY ONE LIGHT", "ERROR %", "WITH SHADOWS %"}};
+  for (const LightingEnvironment& environment : chart.environments) {
+    for (const LightingPoint& point : environment.points) {
+      table.push_back({environment.name, kLightingMethodNames[static_cast<size_t>(point.method)],
+                       fmt::format("{}", point.count), fmt::format("{:.1f}", 1e3 * point.seconds),
+                       fmt::format("{:.1f}", point.seconds / chart.one_light_s),
+                       fmt::format("{:.3f}", 100.0 * point.error),
+                       fmt::format("{:.3f}", 100.0 * point.shadowed_error)});
+    }
+  }
+  return fmt::format("{}\n{}", chart.name, TextTable(table));
+}
+
+absl::StatusOr<std::vector<NamedEnvironment>> EnvironmentsOf(const ChartFlags& flags) {
+  std::vector<std::string> names = flags.environments;
+  if (names.empty()) {
+    for (const std::string& name : GeneratedEnvironmentNames()) {
+      names.push_back(fmt::format("{}{}", kGeneratedPrefix, name));
+    }
+  }
+  std::vector<NamedEnvironment> environments;
+  for (const std::string& name : names) {
+    absl::StatusOr<Environment> environment =
+        name.starts_with(kGeneratedPrefix)
+            ? GeneratedEnvironment(std::string_view(name).substr(std::string_view(kGeneratedPrefix).size()))
+            : ReadEnvironment(name, {});
+    TESSERA_RETURN_IF_ERROR(environment.status());
+    environments.push_back({NameOf(name, names), *std::move(environment)});
+  }
+  return environments;
+}
+
+absl::Status RunLighting(Session& session, const ChartFlags& flags) {
+  TESSERA_RETURN_IF_ERROR(Prepare(flags, "chart lighting"));
+  const std::string html_path = PathIn(flags, "lighting.html");
+  const std::string csv_path = PathIn(flags, "lighting.csv");
+  TESSERA_RETURN_IF_ERROR(AtomicFile::Create(html_path).status());
+  TESSERA_ASSIGN_OR_RETURN(const std::vector<NamedEnvironment> environments, EnvironmentsOf(flags));
+  TESSERA_ASSIGN_OR_RETURN(const std::unique_ptr<OffscreenContext> gl, CreateOsmesaContext());
+  std::vector<LightingChart> charts;
+  std::vector<std::string> summaries;
+  for (const std::string& text : flags.sources) {
+    TESSERA_ASSIGN_OR_RETURN(const std::unique_ptr<BtfSource> source, OpenSource(session, text, flags));
+    TESSERA_ASSIGN_OR_RETURN(
+        LightingChart chart,
+        ChartLighting(NameOf(text, flags.sources), *source, environments,
+                      flags.quick ? ChartSize::kQuick : ChartSize::kFull, *gl, session.Context()));
+    summaries.push_back(SummaryOf(chart));
+    charts.push_back(std::move(chart));
+  }
+  TESSERA_ASSIGN_OR_RETURN(const std::string html, LightingHtml(charts));
+  TESSERA_RETURN_IF_ERROR(WriteFileAtomically(html_path, html));
+  TESSERA_RETURN_IF_ERROR(WriteFileAtomically(csv_path, LightingCsv(charts)));
+  const std::vector<StageTime> stages = session.FinishStages();
+  Json described = Json::array();
+  for (const LightingChart& chart : charts) {
+    described.push_back({{"name", chart.name}, {"environments", chart.environments.size()}});
+  }
+  const std::vector<std::string> files = {html_path, csv_path};
+  session.Answer({{"sources", described}, {"files", files}, {"stages", Session::JsonOfStages(stages)}},
+                 fmt::format("{}\n{}", fmt::join(summaries, "\n\n"), fmt::join(files, "\n")));
+  return absl::OkStatus();
+}
+
+// The options that all charts have.
+std::shared_ptr<ChartFlags> AddChart(CLI::App& command, const char* files, const char* quick) {
   auto flags = std::make_shared<ChartFlags>();
   command.add_option(
       "SOURCE", flags->sources,
@@ -340,14 +408,18 @@ std::shared_ptr<ChartFlags> AddChart(CLI::App& command, const char* files, const
       "..), or a material whose recorded source is at hand");
   command.add_option("-o,--output", flags->folder, files)->required();
   command.add_flag("--quick", flags->quick, quick);
-  command.add_flag("--paper", flags->paper, paper);
-  command.add_flag("--paper-largest", flags->paper_largest, paper_largest);
   command.add_option("--layout", flags->layout, "How the images of folders and files are laid out")
       ->check(CLI::IsMember({"auto", "ubo2003", "manifest", "exr"}))
       ->capture_default_str();
   command.add_option("--transfer", flags->transfer,
                      "Their transfer curve: srgb, linear or gamma:G [by file type]");
   return flags;
+}
+
+// Of the charts that repeat a table of the paper.
+void AddPaper(CLI::App& command, ChartFlags& flags, const char* paper, const char* paper_largest) {
+  command.add_flag("--paper", flags.paper, paper);
+  command.add_flag("--paper-largest", flags.paper_largest, paper_largest);
 }
 
 }  // namespace
@@ -358,9 +430,9 @@ void AddChartCommand(CLI::App& app, Session& session) {
   CLI::App* codecs = noun->add_subcommand(
       "codecs", "Bytes, time and error of every codec and setting, and of JPEG files; minutes a source");
   const auto codec_flags = AddChart(*codecs, "Folder for codecs.html, codecs.csv, paper.csv",
-                                    "Few settings, on the middle 64x64 texels: under a minute",
-                                    "Table II of Leung et al. 2007, ours beside it, up to 256x256 texels",
-                                    "The same with its 800x800 rows: minutes more");
+                                    "Few settings, on the middle 64x64 texels: under a minute");
+  AddPaper(*codecs, *codec_flags, "Table II of Leung et al. 2007, ours beside it, up to 256x256 texels",
+           "The same with its 800x800 rows: minutes more");
   codecs->callback([&session, codec_flags] {
     session.run = [&session, codec_flags] { return RunCodecs(session, *codec_flags); };
   });
@@ -368,11 +440,27 @@ void AddChartCommand(CLI::App& app, Session& session) {
       "synthesis", "Seams, time and repetition of tiles, ours and the published baselines; minutes a source");
   const auto synthesis_flags =
       AddChart(*synthesis, "Folder for synthesis.html, synthesis.csv, tiles.csv and pictures of the tiles",
-               "Few settings, on the middle 64x64 texels: under a minute",
-               "Table III of Leung et al. 2007, ours beside it, from 128x128 texels",
-               "The same with its rows of 256x256 and 800x800 texels: many minutes more");
+               "Few settings, on the middle 64x64 texels: under a minute");
+  AddPaper(*synthesis, *synthesis_flags,
+           "Table III of Leung et al. 2007, ours beside it, from 128x128 texels",
+           "The same with its rows of 256x256 and 800x800 texels: many minutes more");
   synthesis->callback([&session, synthesis_flags] {
     session.run = [&session, synthesis_flags] { return RunSynthesis(session, *synthesis_flags); };
+  });
+  CLI::App* lighting = noun->add_subcommand("lighting",
+                                            "Light from all around: lights by importance against the "
+                                            "frequency domain, error against time; minutes a "
+                                            "source");
+  const auto lighting_flags = AddChart(*lighting, "Folder for lighting.html, lighting.csv",
+                                       "Small pictures, few points: under a minute");
+  lighting
+      ->add_option(
+          "--env", lighting_flags->environments,
+          "Radiance or OpenEXR picture, or generated:sky, studio, sun; repeat for more [those three]")
+      ->expected(1)
+      ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
+  lighting->callback([&session, lighting_flags] {
+    session.run = [&session, lighting_flags] { return RunLighting(session, *lighting_flags); };
   });
 }
 

@@ -159,32 +159,41 @@ absl::Status RunPreview(Session& session, const PreviewFlags& flags) {
   TESSERA_RETURN_IF_ERROR(CheckPreviewFlags(flags));
   TESSERA_ASSIGN_OR_RETURN(const std::vector<Surface> surfaces, SurfacesOf(flags));
   TESSERA_ASSIGN_OR_RETURN(const std::vector<Cell> cells, CellsOf(flags, surfaces));
-  TESSERA_ASSIGN_OR_RETURN(const v1::RenderPreviewRequest base, PreviewRequest(flags));
+  TESSERA_ASSIGN_OR_RETURN(v1::RenderPreviewRequest base, PreviewRequest(flags));
 
   TESSERA_ASSIGN_OR_RETURN(Client * client, session.Connect());
   const RunContext context = session.Context();
+  if (base.has_environment()) {
+    TESSERA_ASSIGN_OR_RETURN(const v1::Blob blob, client->UploadFile(flags.environment, context));
+    base.mutable_environment()->set_sha256(blob.sha256());
+  }
   std::vector<v1::RenderPreviewRequest> on_surface(surfaces.size(), base);
   for (size_t i = 0; i < surfaces.size(); ++i) {
     TESSERA_RETURN_IF_ERROR(SetSurface(*client, surfaces[i], context, on_surface[i]));
   }
   const size_t frames = std::max(flags.turntable, 1);
+  const size_t num_pictures = cells.size() * frames;
+  // The server's progress is told for a single picture, how many are drawn for several.
+  const RunContext of_picture = num_pictures == 1 ? context : RunContext{.stop = context.stop};
   Answer answer;
   std::vector<std::string> pictures;
-  for (size_t i = 0; i < cells.size() * frames; ++i) {
+  for (size_t i = 0; i < num_pictures; ++i) {
     const Cell& cell = cells[i / frames];
-    context.Report("rendering", i, cells.size() * frames, "pictures");
+    if (num_pictures > 1) {
+      context.Report("rendering", i, num_pictures, "pictures");
+    }
     v1::RenderPreviewRequest request = on_surface[cell.surface];
     request.set_tile_set(cell.tile_set);
     if (flags.turntable > 0) {
       request = TurntableRequest(request, static_cast<int>(i), flags.turntable);
     }
-    TESSERA_ASSIGN_OR_RETURN(std::string bytes, client->RenderPreview(request, context));
+    TESSERA_ASSIGN_OR_RETURN(std::string bytes, client->RenderPreview(request, of_picture));
     if (flags.turntable > 0 || flags.sheet) {
       pictures.push_back(std::move(bytes));
     } else {
       TESSERA_RETURN_IF_ERROR(answer.Write(cell.path, bytes, {{"tile_set", ShortName(cell.tile_set)}}));
     }
-    context.Report("rendering", i + 1, cells.size() * frames, "pictures");
+    context.Report("rendering", i + 1, num_pictures, "pictures");
   }
   if (flags.turntable > 0) {
     TESSERA_RETURN_IF_ERROR(WriteTurntable(flags, cells[0].tile_set, pictures, answer));
@@ -209,6 +218,25 @@ void AddLightOptions(CLI::App& command, PreviewFlags& flags) {
           "are red, green, blue. Repeat for up to 64 lights [one over the viewer's left shoulder]")
       ->expected(1)
       ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
+  command.add_option(
+      "--env", flags.environment,
+      "Light from all around: a Radiance or OpenEXR picture, equirectangular (2:1) or an angular "
+      "map (1:1); beside --light, and in place of the usual one");
+  constexpr int kMostEnvironmentLights = 1000;
+  command
+      .add_option("--env-lights", flags.environment_lights,
+                  "As that many lights by importance, which --shadows shadows [50 with --shadows]")
+      ->check(CLI::Range(1, kMostEnvironmentLights));
+  constexpr int kMostEnvironmentOrder = 7;
+  command
+      .add_option("--env-order", flags.environment_order,
+                  "In the frequency domain, as ORDER squared spherical harmonics, which nothing shadows [5 "
+                  "without --shadows]")
+      ->check(CLI::Range(1, kMostEnvironmentOrder));
+  command.add_option("--env-rotation", flags.environment_rotation_deg,
+                     "Degrees about the vertical, counter-clockwise seen from above [0]");
+  command.add_option("--env-scale", flags.environment_scale, "Of its radiance [1]")
+      ->check(CLI::PositiveNumber);
   command.add_flag("--shadows", flags.shadows, "Shadows of the mesh on itself");
   command.add_option("--shadow-map", flags.shadow_map,
                      "Texels on a side of a light's shadow map, 64 to 2048: finer edges [1024]");

@@ -50,6 +50,20 @@ absl::Status SetView(const PreviewFlags& flags, v1::RenderPreviewRequest& reques
   return absl::OkStatus();
 }
 
+void SetEnvironment(const PreviewFlags& flags, v1::RenderPreviewRequest& request) {
+  if (flags.environment.empty()) {
+    return;
+  }
+  v1::EnvironmentLight& environment = *request.mutable_environment();
+  environment.set_rotation_deg(flags.environment_rotation_deg);
+  environment.set_scale(flags.environment_scale);
+  if (flags.environment_lights != 0) {
+    environment.set_num_lights(flags.environment_lights);
+  } else if (flags.environment_order != 0) {
+    environment.set_order(flags.environment_order);
+  }
+}
+
 void SetDevelopment(const PreviewFlags& flags, v1::RenderPreviewRequest& request) {
   if (flags.exposure_stops != 0.0 || flags.tone != "none" || flags.white != 0.0) {
     v1::Tone& tone = *request.mutable_tone();
@@ -81,6 +95,14 @@ absl::Status CheckPreviewFlags(const PreviewFlags& flags) {
   }
   if (flags.shadow_map != 0 && !flags.shadows) {
     return UsageError("--shadow-map goes with --shadows");
+  }
+  const bool has_environment = !flags.environment.empty();
+  if (!has_environment && (flags.environment_lights != 0 || flags.environment_order != 0 ||
+                           flags.environment_rotation_deg != 0.0 || flags.environment_scale != 0.0)) {
+    return UsageError("--env-lights, --env-order, --env-rotation and --env-scale go with --env");
+  }
+  if (flags.environment_lights != 0 && flags.environment_order != 0) {
+    return UsageError("--env-lights excludes --env-order");
   }
   const size_t num_pictures = flags.tile_sets.size() * (flags.dressings.size() + flags.meshes.size());
   if (flags.turntable > 0 && (flags.sheet || num_pictures > 1)) {
@@ -124,6 +146,7 @@ absl::StatusOr<v1::RenderPreviewRequest> PreviewRequest(const PreviewFlags& flag
   request.set_shadows(flags.shadows);
   request.set_shadow_map_size(flags.shadow_map);
   TESSERA_RETURN_IF_ERROR(SetView(flags, request));
+  SetEnvironment(flags, request);
   SetDevelopment(flags, request);
   return request;
 }

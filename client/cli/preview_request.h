@@ -19,6 +19,11 @@ struct PreviewFlags {
   std::vector<std::string> meshes;
   uint64_t seed = 1;
   std::vector<std::string> lights;
+  std::string environment;  // a file; empty: none
+  double environment_rotation_deg = 0.0;
+  double environment_scale = 0.0;  // 0: the server's
+  int environment_lights = 0;      // 0: the server's choice, or environment_order
+  int environment_order = 0;
   bool shadows = false;
   uint32_t shadow_map = 0;  // 0: the server's
   std::string eye;          // with target, up, or all empty
@@ -46,7 +51,7 @@ struct PreviewFlags {
 // PNG or EXR by the output's name; `.apng` where the picture is animated. Errors: UsageError.
 [[nodiscard]] absl::StatusOr<PictureFormat> PreviewFormat(const PreviewFlags& flags);
 
-// Everything but tile set and surface. Errors: UsageError naming the flag.
+// Everything but tile set, surface and the environment's blob. Errors: UsageError naming the flag.
 [[nodiscard]] absl::StatusOr<v1::RenderPreviewRequest> PreviewRequest(const PreviewFlags& flags);
 
 // Frame `frame` of a turntable: `base`, its eye and lights turned by frame / frames of a circle.

@@ -151,7 +151,7 @@ class Client {
   // Dressings and pictures, made by the server.
   [[nodiscard]] absl::StatusOr<v1::DressMeshResponse> DressMesh(v1::DressMeshRequest request,
                                                                 const RunContext& context = {});
-  // The bytes of a PNG or EXR file.
+  // The bytes of a PNG or EXR file. Progress is the server's.
   [[nodiscard]] absl::StatusOr<std::string> RenderPreview(v1::RenderPreviewRequest request,
                                                           const RunContext& context = {});
 

@@ -396,12 +396,16 @@ absl::StatusOr<std::string> Client::RenderPreview(v1::RenderPreviewRequest reque
   while (true) {
     TESSERA_RETURN_IF_ERROR(context.CheckStop());
     StoppableCall call(context);
-    const std::unique_ptr<grpc::ClientReader<v1::DataChunk>> stream =
+    const std::unique_ptr<grpc::ClientReader<v1::RenderPreviewResponse>> stream =
         stubs_->previews->RenderPreview(call.rpc(), request);
     std::string bytes;
-    v1::DataChunk chunk;
-    while (stream->Read(&chunk)) {
-      bytes.append(chunk.data());
+    v1::RenderPreviewResponse response;
+    while (stream->Read(&response)) {
+      bytes.append(response.data());
+      if (response.has_progress()) {
+        const v1::JobProgress& progress = response.progress();
+        context.Report(progress.stage(), progress.done(), progress.total(), progress.unit());
+      }
     }
     const absl::Status status = StatusFromGrpc(stream->Finish());
     if (status.ok()) {

@@ -230,6 +230,15 @@ Orbit OrbitFromMessage(const v1::Orbit& message) {
   return orbit;
 }
 
+v1::JobProgress MessageFromProgress(const Progress& progress) {
+  v1::JobProgress message;
+  message.set_stage(std::string(progress.stage));
+  message.set_done(progress.done);
+  message.set_total(progress.total);
+  message.set_unit(std::string(progress.unit));
+  return message;
+}
+
 absl::StatusOr<Tone> ToneFromMessage(const v1::Tone& message) {
   Tone tone{.exposure_stops = message.exposure_stops()};
   switch (message.curve()) {

@@ -29,6 +29,8 @@ namespace tessera {
 // not match).
 [[nodiscard]] absl::StatusOr<Arrangement> ArrangementFromMessage(const v1::Arrangement& message);
 
+[[nodiscard]] v1::JobProgress MessageFromProgress(const Progress& progress);
+
 // What a catalog tells of a container: every field but name, blob and create_time.
 [[nodiscard]] v1::Material MessageFromMaterial(const Material& material);
 [[nodiscard]] v1::TileSet MessageFromTileSet(const TileSet& tile_set);

@@ -3,6 +3,8 @@
 #include <utility>
 #include <vector>
 
+#include "proto/wire/convert.h"
+
 namespace tessera {
 namespace {
 
@@ -58,10 +60,7 @@ void JobEvents::Report(int64_t id, const Progress& progress) {
       return;
     }
     run.told = now;
-    told.set_stage(std::string(progress.stage));
-    told.set_done(progress.done);
-    told.set_total(progress.total);
-    told.set_unit(std::string(progress.unit));
+    told = MessageFromProgress(progress);
     sequence = ++run.sequence;
     job = run.job;
   }

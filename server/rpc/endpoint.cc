@@ -145,10 +145,10 @@ class PreviewsAdapter final : public v1::Previews::Service {
  public:
   explicit PreviewsAdapter(const Backend& backend) : service_(backend) {}
   grpc::Status RenderPreview(ServerContext* context, const v1::RenderPreviewRequest* request,
-                             grpc::ServerWriter<v1::DataChunk>* writer) override {
-    return GrpcFromStatus(
-        service_.RenderPreview(*request, CancelledBy(context),
-                               [writer](const v1::DataChunk& chunk) { return writer->Write(chunk); }));
+                             grpc::ServerWriter<v1::RenderPreviewResponse>* writer) override {
+    return GrpcFromStatus(service_.RenderPreview(
+        *request, CancelledBy(context),
+        [writer](const v1::RenderPreviewResponse& response) { return writer->Write(response); }));
   }
 
  private:

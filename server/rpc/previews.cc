@@ -22,11 +22,13 @@
 #include "proto/wire/status.h"
 #include "server/rpc/dressings.h"
 #include "server/rpc/formats.h"
+#include "server/rpc/preview_environment.h"
 
 namespace tessera {
 namespace {
 
 constexpr std::chrono::milliseconds kContextPoll{20};
+constexpr std::chrono::milliseconds kTellInterval{200};
 constexpr double kTexelsWithoutMips = 4.0;  // along a pixel's side
 
 absl::Status Refuse(const std::string& message, std::string_view field) {
@@ -194,7 +196,7 @@ absl::StatusOr<std::string> PreviewsService::Render(const v1::RenderPreviewReque
   if (request.lights_size() > kMaxPreviewLights) {
     return Refuse(absl::StrCat(request.lights_size(), " lights, at most ", kMaxPreviewLights), "lights");
   }
-  if (request.lights_size() > 0) {
+  if (request.lights_size() > 0 || request.has_environment()) {
     scene.lights.clear();
     std::transform(request.lights().begin(), request.lights().end(), std::back_inserter(scene.lights),
                    LightFromMessage);
@@ -218,6 +220,9 @@ absl::StatusOr<std::string> PreviewsService::Render(const v1::RenderPreviewReque
   scene.dressing = &dressing;
   scene.tile_set = &tile_set;
   TESSERA_RETURN_IF_ERROR(SetCamera(request, scene));
+  TESSERA_ASSIGN_OR_RETURN(const PreviewEnvironment environment, EnvironmentOf(backend_, request));
+  scene.lights.insert(scene.lights.end(), environment.lights.begin(), environment.lights.end());
+  scene.frequency_light = environment.frequency_light.has_value() ? &*environment.frequency_light : nullptr;
   TESSERA_ASSIGN_OR_RETURN(const std::optional<TileMips> mips, MipsOf(request.mips(), scene, context));
   scene.mips = mips.has_value() ? &*mips : nullptr;
 
@@ -235,17 +240,28 @@ absl::StatusOr<std::string> PreviewsService::Render(const v1::RenderPreviewReque
 }
 
 absl::Status PreviewsService::RenderPreview(const v1::RenderPreviewRequest& request,
-                                            const IsCancelled& is_cancelled,
-                                            const std::function<bool(const v1::DataChunk&)>& write) {
+                                            const IsCancelled& is_cancelled, const WritePreview& write) {
   std::string picture;
-  TESSERA_RETURN_IF_ERROR(RunForCaller(is_cancelled, [&](const RunContext& context) -> absl::Status {
+  TESSERA_RETURN_IF_ERROR(RunForCaller(is_cancelled, [&](const RunContext& run_context) -> absl::Status {
+    RunContext context = run_context;
+    auto told = std::chrono::steady_clock::now();
+    context.progress = [&](const Progress& progress) {
+      const auto now = std::chrono::steady_clock::now();
+      if (now - told < kTellInterval) {
+        return;
+      }
+      told = now;
+      v1::RenderPreviewResponse response;
+      *response.mutable_progress() = MessageFromProgress(progress);
+      (void)write(response);  // a caller that is gone is found by RunForCaller
+    };
     TESSERA_ASSIGN_OR_RETURN(picture, Render(request, context));
     return absl::OkStatus();
   }));
-  v1::DataChunk chunk;
+  v1::RenderPreviewResponse response;
   for (size_t offset = 0; offset < picture.size(); offset += kChunkBytes) {
-    chunk.set_data(picture.substr(offset, kChunkBytes));
-    if (!write(chunk)) {
+    response.set_data(picture.substr(offset, kChunkBytes));
+    if (!write(response)) {
       return absl::CancelledError("the caller went away");
     }
   }

@@ -23,16 +23,18 @@ inline constexpr int kMaxPreviewLights = 64;
 // Codes and index of mip levels; on the way into the picture they take about twice as much again.
 inline constexpr uint64_t kMaxPreviewMipBytes = uint64_t{512} << 20;
 
+// False once the caller is gone.
+using WritePreview = std::function<bool(const v1::RenderPreviewResponse&)>;
+
 // Pictures are drawn one after the other in one offscreen context: the software renderer spreads each over
 // every core by itself. Thread-safe.
 class PreviewsService {
  public:
   explicit PreviewsService(const Backend& backend) : backend_(backend) {}
 
-  // `write` is false once the caller is gone.
+  // Writes progress while it draws, then the picture.
   [[nodiscard]] absl::Status RenderPreview(const v1::RenderPreviewRequest& request,
-                                           const IsCancelled& is_cancelled,
-                                           const std::function<bool(const v1::DataChunk&)>& write);
+                                           const IsCancelled& is_cancelled, const WritePreview& write);
 
  private:
   [[nodiscard]] absl::StatusOr<std::string> Render(const v1::RenderPreviewRequest& request,

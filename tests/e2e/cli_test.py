@@ -413,6 +413,20 @@ class MainJobTest(harness.CommandTest):
                             "tone": ("--exposure", 1, "--tone", "filmic"), "ground": ("--background", "203040")}.items():
             self.run_ok(*small, "--mips", "off", *flags, "-o", f"{name}.png")
             self.assertNotEqual((self.folder / f"{name}.png").read_bytes(), plain, name)
+        # Light from all around: bright above, dark below.
+        (self.folder / "sky.hdr").write_bytes(
+            b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 4 +X 8\n" +
+            b"".join(bytes((128, 128, 128, 130 - 2 * (i // 8))) for i in range(32)))
+        pictures = {plain}
+        for name, flags in {"sky": (), "sky-2": ("--env-order", 2), "sky-10": ("--env-lights", 10),
+                            "sky-shadows": ("--shadows",), "sky-dim": ("--env-scale", ".2"),
+                            "sky-sun": ("--light", "20,60")}.items():
+            self.run_ok(*small, "--mips", "off", "--env", "sky.hdr", *flags, "-o", f"{name}.png")
+            pictures.add((self.folder / f"{name}.png").read_bytes())
+        self.assertEqual(len(pictures), 7)
+        self.assert_fails(2, *small, "--env-order", 2, "-o", "none.png", says="--env")
+        self.assert_fails(2, *small, "--env", "sky.hdr", "--env-order", 2, "--env-lights", 2, "-o", "none.png")
+        self.assert_fails(5, *small, "--env", "skin.png", "-o", "none.png", says="2:1")
         self.assert_fails(2, *small, "--eye", "0,0,3", "--orbit", "0,0", "-o", "none.png")
         self.assert_fails(5, *small, "--orbit", "0,95", "-o", "none.png", says="elevation")
         self.assert_fails(5, *small, "--tone", "filmic", "-o", "none.exr", says="EXR")

@@ -107,7 +107,7 @@ TEST(EnvironmentTest, ChoosesOrTakesTheLayout) {
   EXPECT_EQ(Environment::Create(Image(8, 8, 3), "a", {})->grid().layout(), EnvironmentLayout::kAngular);
   EXPECT_EQ(Environment::Create(Image(8, 8, 3), "a", {EnvironmentLayout::kEquirect})->grid().layout(),
             EnvironmentLayout::kEquirect);
-  EXPECT_THAT(Refusal(Image(8, 5, 3)), HasSubstr("probe: 8x5 texels is neither 2:1"));
+  EXPECT_THAT(Refusal(Image(8, 5, 3)), HasSubstr("probe: 8x5 texels, expected 2:1"));
   EXPECT_THAT(Refusal(Image(8, 4, 3), {EnvironmentLayout::kAngular}),
               HasSubstr("8x4 texels, an angular map"));
 }

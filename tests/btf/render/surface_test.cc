@@ -61,7 +61,7 @@ int ExpectSameReflectanceAcrossEdges(const Dressing& dressing, const TileSet& ti
   const Eigen::Vector3d eye(0.4, 0.3, 3.0);
   const auto reflectance = [&](const SurfacePoint& point) {
     const SurfaceFrame frame = surface->FrameAt(point);
-    return ReflectanceOfTaps(*surface, **decoder, frame, surface->BilinearTaps(point), to_light,
+    return ReflectanceOfTaps({*surface, surface->BilinearTaps(point)}, **decoder, frame, to_light,
                              (eye - frame.position).normalized());
   };
   int edges = 0;
@@ -117,7 +117,7 @@ TEST_F(SurfaceTest, TilesLaidTurnedShowWhatTurnedTilesShow) {
     const SurfacePoint point{face, rng.NextDouble(), rng.NextDouble()};
     const auto reflectance = [&](const DressedSurface& on) {
       const SurfaceFrame frame = on.FrameAt(point);
-      return ReflectanceOfTaps(on, *decoder, frame, on.BilinearTaps(point), to_light, frame.n);
+      return ReflectanceOfTaps({on, on.BilinearTaps(point)}, *decoder, frame, to_light, frame.n);
     };
     EXPECT_LT((reflectance(*surface) - reflectance(*expected)).abs().maxCoeff(), kRounding) << face;
   }
@@ -141,8 +141,8 @@ TEST_F(SurfaceTest, BothSidesOfEveryEdgeShowTheSameMipLevels) {
         for (int i = 0; i < 5 && across.face > face; ++i) {
           const double along = 0.03 + 0.94 * i / 4.0;
           const auto reflectance = [&](const SurfacePoint& point) {
-            return ReflectanceOfTaps(*surface, **decoder, surface->FrameAt(point),
-                                     surface->MipTaps(point, level), to_light, to_eye);
+            return ReflectanceOfTaps({*surface, surface->MipTaps(point, level)}, **decoder,
+                                     surface->FrameAt(point), to_light, to_eye);
           };
           const Eigen::Array3d here = reflectance(PointOnSide(face, side, along));
           const Eigen::Array3d there = reflectance(PointOnSide(across.face, across.side, 1.0 - along));

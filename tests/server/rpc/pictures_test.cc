@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include "btf/image/image_io.h"
+
 #include "btf/wang/arrangement.h"
 #include "btf/wang/dressing.h"
 #include "btf/wang/tile_set.h"
@@ -100,7 +102,7 @@ TEST_F(ServerTest, PicturesAreDrawn) {
     grpc::ClientContext context;
     auto reader = stubs_->previews->RenderPreview(&context, request);
     std::string picture;
-    for (v1::DataChunk chunk; reader->Read(&chunk);) {
+    for (v1::RenderPreviewResponse chunk; reader->Read(&chunk);) {
       picture += chunk.data();
     }
     const grpc::Status status = reader->Finish();
@@ -160,6 +162,47 @@ TEST_F(ServerTest, PicturesAreDrawn) {
   request.clear_orbit();
   EXPECT_TRUE(render().ok()) << render().status();
   request.clear_camera();
+
+  // Light from all around, as lights and in the frequency domain.
+  Image sky(16, 8, 3);
+  for (int i = 0; i < 16 * 8; ++i) {
+    sky.pixels[3 * i + i % 3] = static_cast<float>(i % 16 + 1) / 8.0F;
+  }
+  request.set_builtin("torus");
+  v1::EnvironmentLight& environment = *request.mutable_environment();
+  environment.set_sha256(stubs_->Upload(*EncodeExr(sky)));
+  const auto smooth = render();
+  ASSERT_TRUE(smooth.ok()) << smooth.status();
+  environment.set_order(5);
+  EXPECT_EQ(*render(), *smooth);
+  environment.set_rotation_deg(90);
+  EXPECT_FALSE(*render() == *smooth);
+  environment.clear_rotation_deg();
+  environment.set_scale(0.5);
+  EXPECT_FALSE(*render() == *smooth);
+  environment.set_scale(-1);
+  EXPECT_EQ(SubjectOf(render().status()), "environment");
+  environment.clear_scale();
+  request.set_shadows(true);
+  EXPECT_EQ(SubjectOf(render().status()), "environment");
+  environment.clear_method();
+  const auto shadowed = render();
+  ASSERT_TRUE(shadowed.ok()) << shadowed.status();
+  environment.set_num_lights(50);
+  EXPECT_EQ(*render(), *shadowed);
+  request.clear_shadows();
+  EXPECT_FALSE(*render() == *shadowed);
+  request.set_builtin("cube-sphere");
+  environment.set_num_lights(1001);
+  EXPECT_EQ(SubjectOf(render().status()), "environment");
+  environment.set_order(8);
+  EXPECT_EQ(SubjectOf(render().status()), "environment");
+  environment.clear_method();
+  environment.set_sha256(stubs_->Upload("no picture"));
+  EXPECT_EQ(SubjectOf(render().status()), "environment");
+  environment.set_sha256(std::string(64, '0'));
+  EXPECT_EQ(render().status().code(), absl::StatusCode::kNotFound);
+  request.clear_environment();
 
   v1::DressMeshRequest dress;
   dress.set_arrangement("arrangements/plane-16");
