@@ -121,6 +121,7 @@ Json Describe(const v1::TileSet& tile_set) {
           {"arrangement_sha256", tile_set.arrangement_sha256()},
           {"provenance", Describe(tile_set.provenance())},
           {"blob", Describe(tile_set.blob())},
+          {"thumbnail", tile_set.has_thumbnail() ? Describe(tile_set.thumbnail()) : Json()},
           {"create_time", Describe(tile_set.create_time())},
           {"certificate", Embedded(tile_set.certificate_json())},
           {"metadata", Embedded(tile_set.metadata_json())}};

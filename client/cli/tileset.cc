@@ -1,4 +1,4 @@
-// tessera tileset synthesize | list | show | pull | certify | sheet | mips | delete
+// tessera tileset synthesize | list | show | pull | certify | sheet | thumbnail | mips | delete
 #include <memory>
 
 #include <fmt/format.h>
@@ -13,10 +13,13 @@
 #include "client/cli/certificate.h"
 #include "client/cli/commands.h"
 #include "client/cli/describe.h"
+#include "client/cli/exit_codes.h"
 #include "client/cli/mask.h"
 #include "client/cli/pattern.h"
 #include "client/cli/pull.h"
 #include "client/lib/names.h"
+#include "proto/wire/names.h"
+#include "proto/wire/status.h"
 
 namespace tessera::cli {
 namespace {
@@ -200,6 +203,54 @@ absl::Status RunTileSetSheet(Session& session, const TileSetSheetFlags& flags) {
   return absl::OkStatus();
 }
 
+struct ThumbnailFlags {
+  std::string name;
+  std::string output;
+};
+
+// The job that draws the tile set's thumbnail and has not ended; empty when there is none.
+absl::StatusOr<std::string> FindThumbnailJob(Client& client, const TileSetId& id, const RunContext& context) {
+  TESSERA_ASSIGN_OR_RETURN(const std::vector<v1::Job> jobs, client.ListJobs(context));
+  for (const v1::Job& job : jobs) {
+    const bool is_active = job.state() == v1::Job::QUEUED || job.state() == v1::Job::RUNNING;
+    if (is_active && job.result_name() == ThumbnailName(id)) {
+      return job.name();
+    }
+  }
+  return "";
+}
+
+absl::Status RunThumbnail(Session& session, const ThumbnailFlags& flags) {
+  TESSERA_ASSIGN_OR_RETURN(const std::string full_name, FullTileSetName(flags.name));
+  TESSERA_ASSIGN_OR_RETURN(const TileSetId id, ParseTileSetName(full_name));
+  TESSERA_ASSIGN_OR_RETURN(const PictureFormat format, PictureFormatOf(flags.output));
+  if (format != PictureFormat::kPng) {
+    return UsageError(fmt::format("-o {}: a thumbnail is a PNG", flags.output));
+  }
+  TESSERA_ASSIGN_OR_RETURN(Client * client, session.Connect());
+  const RunContext context = session.Context();
+  TESSERA_ASSIGN_OR_RETURN(v1::TileSet tile_set, client->GetTileSet(full_name, context));
+  if (!tile_set.has_thumbnail()) {
+    TESSERA_ASSIGN_OR_RETURN(const std::string job, FindThumbnailJob(*client, id, context));
+    if (!job.empty()) {
+      TESSERA_RETURN_IF_ERROR(client->WaitForJob(job, OnStop::kLeaveJob, context).status());
+    }
+    // Also without a job: it may have ended since the first look.
+    TESSERA_ASSIGN_OR_RETURN(tile_set, client->GetTileSet(full_name, context));
+  }
+  if (!tile_set.has_thumbnail()) {
+    return WithReason(absl::NotFoundError(fmt::format(
+                          "{} has no thumbnail: it comes from an older catalog, or its job failed "
+                          "(tessera job list); tessera tileset certify {} makes one",
+                          ShortName(full_name), ShortName(full_name))),
+                      "NOT_FOUND", full_name);
+  }
+  TESSERA_RETURN_IF_ERROR(client->DownloadFile(tile_set.thumbnail(), flags.output, context));
+  session.FinishStages();
+  session.Answer({{"file", flags.output}, {"sha256", tile_set.thumbnail().sha256()}}, flags.output);
+  return absl::OkStatus();
+}
+
 absl::Status RunMips(Session& session, const std::string& name) {
   TESSERA_ASSIGN_OR_RETURN(const std::string full_name, FullTileSetName(name));
   TESSERA_ASSIGN_OR_RETURN(Client * client, session.Connect());
@@ -334,6 +385,15 @@ void AddTileSetCommands(CLI::App& app, Session& session) {
   });
 
   AddSheet(*noun, session);
+
+  const auto thumbnail_flags = std::make_shared<ThumbnailFlags>();
+  CLI::App* thumbnail = noun->add_subcommand(
+      "thumbnail", "The picture of 2 x 2 tiles, 128 x 128 pixels, that the server made of it");
+  thumbnail->add_option("TILESET", thumbnail_flags->name, "ARRANGEMENT/NAME")->required();
+  thumbnail->add_option("-o,--output", thumbnail_flags->output, "File to write, .png")->required();
+  thumbnail->callback([&session, thumbnail_flags] {
+    session.run = [&session, thumbnail_flags] { return RunThumbnail(session, *thumbnail_flags); };
+  });
 
   CLI::App* mips = noun->add_subcommand("mips",
                                         "The mip levels that pictures of far objects use: sizes, and how far "

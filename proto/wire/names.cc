@@ -17,6 +17,7 @@ constexpr std::string_view kMaterials = "materials/";
 constexpr std::string_view kJobs = "jobs/";
 constexpr std::string_view kArrangements = "arrangements/";
 constexpr std::string_view kTileSets = "/tileSets/";
+constexpr std::string_view kThumbnail = "/thumbnail";
 
 bool IsId(std::string_view text) {
   return !text.empty() && text.size() <= kMaxIdLength && std::all_of(text.begin(), text.end(), [](char c) {
@@ -93,6 +94,17 @@ absl::StatusOr<TileSetId> ParseTileSetName(std::string_view name) {
 
 std::string TileSetName(const TileSetId& id) {
   return Joined(kArrangements, id.arrangement).append(kTileSets).append(id.tile_set);
+}
+
+absl::StatusOr<TileSetId> ParseThumbnailName(std::string_view name) {
+  if (!name.ends_with(kThumbnail)) {
+    return Invalid(name, "arrangements/A/tileSets/T/thumbnail");
+  }
+  return ParseTileSetName(name.substr(0, name.size() - kThumbnail.size()));
+}
+
+std::string ThumbnailName(const TileSetId& id) {
+  return TileSetName(id).append(kThumbnail);
 }
 
 absl::Status CheckDigest(std::string_view sha256, std::string_view field) {

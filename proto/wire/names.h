@@ -32,6 +32,10 @@ struct TileSetId {
 [[nodiscard]] absl::StatusOr<TileSetId> ParseTileSetName(std::string_view name);
 [[nodiscard]] std::string TileSetName(const TileSetId& id);
 
+// `arrangements/A/tileSets/T/thumbnail`, what a job that draws a tile set makes.
+[[nodiscard]] absl::StatusOr<TileSetId> ParseThumbnailName(std::string_view name);
+[[nodiscard]] std::string ThumbnailName(const TileSetId& id);
+
 // OK for 64 lower-case hexadecimal digits. Errors: INVALID_ARGUMENT with reason ARGUMENT_INVALID and subject
 // `field`.
 [[nodiscard]] absl::Status CheckDigest(std::string_view sha256, std::string_view field);

@@ -249,6 +249,7 @@ absl::Status BlobStore::CollectGarbage() {
         db.Query("DELETE FROM blobs WHERE touch_ms < ?"
                  " AND NOT EXISTS (SELECT 1 FROM materials WHERE blob_sha256 = blobs.sha256)"
                  " AND NOT EXISTS (SELECT 1 FROM tile_sets WHERE blob_sha256 = blobs.sha256)"
+                 " AND NOT EXISTS (SELECT 1 FROM tile_sets WHERE thumbnail_sha256 = blobs.sha256)"
                  " AND NOT EXISTS (SELECT 1 FROM job_inputs WHERE job_inputs.sha256 = blobs.sha256)"
                  " RETURNING sha256, typeof(data) = 'null'",
                  cutoff_ms));

@@ -41,6 +41,12 @@ absl::Status TouchBlob(Database& db, const std::string& sha256, int64_t now_ms) 
   return db.Run("UPDATE blobs SET touch_ms = ? WHERE sha256 = ?", now_ms, sha256);
 }
 
+// What a tile set lets go of when it is deleted or replaced.
+absl::Status TouchBlobsOf(Database& db, const v1::TileSet& tile_set, int64_t now_ms) {
+  TESSERA_RETURN_IF_ERROR(TouchBlob(db, tile_set.blob().sha256(), now_ms));
+  return TouchBlob(db, tile_set.thumbnail().sha256(), now_ms);
+}
+
 constexpr std::string_view kMaterialColumns =
     "SELECT name, blob_sha256, size_bytes, width, height, codec, num_coefficients, num_views, num_lights, "
     "source,"
@@ -68,10 +74,11 @@ v1::Material MaterialOfRow(const Statement& row) {
 }
 
 constexpr std::string_view kTileSetColumns =
-    "SELECT arrangement, name, blob_sha256, size_bytes, arrangement_sha256, tile_size, strip_height, "
-    "num_tiles,"
-    " num_btfels, codec, source, licence, citation, certificate_json, metadata_json, create_ms"
-    " FROM tile_sets JOIN blobs ON blobs.sha256 = tile_sets.blob_sha256 ";
+    "SELECT arrangement, name, blob_sha256, blobs.size_bytes, arrangement_sha256, tile_size, strip_height,"
+    " num_tiles, num_btfels, codec, source, licence, citation, certificate_json, metadata_json, create_ms,"
+    " thumbnail_sha256, thumbnails.size_bytes"
+    " FROM tile_sets JOIN blobs ON blobs.sha256 = tile_sets.blob_sha256"
+    " LEFT JOIN blobs AS thumbnails ON thumbnails.sha256 = tile_sets.thumbnail_sha256 ";
 
 v1::TileSet TileSetOfRow(const Statement& row) {
   v1::TileSet message;
@@ -90,6 +97,10 @@ v1::TileSet TileSetOfRow(const Statement& row) {
   message.set_certificate_json(row.Text(13));
   message.set_metadata_json(row.Text(14));
   *message.mutable_create_time() = TimeUtil::MillisecondsToTimestamp(row.Int(15));
+  if (!row.IsNull(16)) {
+    message.mutable_thumbnail()->set_sha256(row.Text(16));
+    message.mutable_thumbnail()->set_size_bytes(static_cast<uint64_t>(row.Int(17)));
+  }
   return message;
 }
 
@@ -175,18 +186,23 @@ absl::StatusOr<v1::TileSet> PutTileSet(Database& db, const TileSetId& id, const 
     if (on_taken == OnTaken::kRefuse) {
       return NameTaken(message.name());
     }
-    TESSERA_RETURN_IF_ERROR(TouchBlob(db, old->blob().sha256(), now_ms));
+    TESSERA_RETURN_IF_ERROR(TouchBlobsOf(db, *old, now_ms));
   } else if (old.status().code() != absl::StatusCode::kNotFound) {
     return old.status();
+  }
+  std::optional<std::string> thumbnail_sha256;
+  if (message.has_thumbnail()) {
+    thumbnail_sha256 = message.thumbnail().sha256();
   }
   TESSERA_RETURN_IF_ERROR(db.Run(
       "INSERT OR REPLACE INTO tile_sets (arrangement, name, blob_sha256, arrangement_sha256, tile_size,"
       " strip_height, num_tiles, num_btfels, codec, source, licence, citation, certificate_json,"
-      " metadata_json, create_ms) VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
+      " metadata_json, create_ms, thumbnail_sha256)"
+      " VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
       id.arrangement, id.tile_set, blob_sha256, message.arrangement_sha256(), message.tile_size(),
       message.strip_height(), message.num_tiles(), message.num_btfels(), message.codec(),
       message.provenance().source(), message.provenance().licence(), message.provenance().citation(),
-      message.certificate_json(), message.metadata_json(), now_ms));
+      message.certificate_json(), message.metadata_json(), now_ms, thumbnail_sha256));
   return message;
 }
 
@@ -230,8 +246,20 @@ absl::StatusOr<v1::ListTileSetsResponse> ListTileSets(Database& db, const std::s
 
 absl::Status DeleteTileSet(Database& db, const TileSetId& id, int64_t now_ms) {
   TESSERA_ASSIGN_OR_RETURN(const v1::TileSet old, GetTileSet(db, id));
-  TESSERA_RETURN_IF_ERROR(TouchBlob(db, old.blob().sha256(), now_ms));
+  TESSERA_RETURN_IF_ERROR(TouchBlobsOf(db, old, now_ms));
   return db.Run("DELETE FROM tile_sets WHERE arrangement = ? AND name = ?", id.arrangement, id.tile_set);
+}
+
+absl::Status PutThumbnail(Database& db, const TileSetId& id, const std::string& tile_set_sha256,
+                          const std::string& thumbnail_sha256, int64_t now_ms) {
+  TESSERA_ASSIGN_OR_RETURN(const v1::TileSet tile_set, GetTileSet(db, id));
+  if (tile_set.blob().sha256() != tile_set_sha256) {
+    return absl::FailedPreconditionError(absl::StrCat(tile_set.name(), " was replaced meanwhile"));
+  }
+  TESSERA_RETURN_IF_ERROR(FindBlob(db, thumbnail_sha256).status());
+  TESSERA_RETURN_IF_ERROR(TouchBlob(db, tile_set.thumbnail().sha256(), now_ms));
+  return db.Run("UPDATE tile_sets SET thumbnail_sha256 = ? WHERE arrangement = ? AND name = ?",
+                thumbnail_sha256, id.arrangement, id.tile_set);
 }
 
 absl::Status CheckNameFree(Database& db, const std::string& name) {

@@ -31,7 +31,7 @@ enum class OnTaken { kRefuse, kReplace };
 // Errors: NOT_FOUND. The blob stays for a day.
 [[nodiscard]] absl::Status DeleteMaterial(Database& db, const std::string& material, int64_t now_ms);
 
-// The same for tile sets.
+// The same for tile sets. message.thumbnail is kept as it is given: what the name had before goes.
 [[nodiscard]] absl::StatusOr<v1::TileSet> PutTileSet(Database& db, const TileSetId& id,
                                                      const std::string& blob_sha256, v1::TileSet message,
                                                      OnTaken on_taken, int64_t now_ms);
@@ -41,6 +41,10 @@ enum class OnTaken { kRefuse, kReplace };
                                                                     const std::string& arrangement,
                                                                     const Page& page);
 [[nodiscard]] absl::Status DeleteTileSet(Database& db, const TileSetId& id, int64_t now_ms);
+// Makes a blob the picture of a tile set. Errors: NOT_FOUND, also of the blob (BLOB_MISSING);
+// FAILED_PRECONDITION when the name does not point to `tile_set_sha256` any more.
+[[nodiscard]] absl::Status PutThumbnail(Database& db, const TileSetId& id, const std::string& tile_set_sha256,
+                                        const std::string& thumbnail_sha256, int64_t now_ms);
 
 inline constexpr std::string_view kMaterialList = "materials";
 [[nodiscard]] std::string TileSetList(const std::string& arrangement);

@@ -4,6 +4,7 @@
 #include "server/jobs/generate_job.h"
 #include "server/jobs/import_job.h"
 #include "server/jobs/synthesize_job.h"
+#include "server/jobs/thumbnail_job.h"
 
 namespace tessera {
 
@@ -13,6 +14,7 @@ std::vector<JobKind> BuiltinJobKinds() {
       {"generate", 1, &RunGenerateJob},
       {"synthesize", 2, &RunSynthesizeJob},
       {std::string(kCertifyKind), 1, &RunCertifyJob, /*updates_result=*/true},
+      {std::string(kThumbnailKind), 1, &RunThumbnailJob},
   };
 }
 

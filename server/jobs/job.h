@@ -47,20 +47,23 @@ struct JobContext {
 };
 
 struct JobOutput {
-  std::string blob;  // bytes of a container
-  // What the catalog tells of it; name, blob and create_time are not set.
+  std::string blob;  // bytes of a container, or of a picture
+  // What the catalog tells of it; name, blob and create_time are not set. Of a thumbnail: an empty TileSet.
   std::variant<v1::Material, v1::TileSet> resource;
 };
 
 using JobFunction =
     std::function<absl::StatusOr<JobOutput>(const JobInput& input, const JobContext& context)>;
 
+// The kind of which the pool queues a job for each new tile set. Its one input is the tile set.
+inline constexpr std::string_view kThumbnailKind = "thumbnail";
+
 struct JobKind {
   std::string name;
   int version = 1;  // part of the identity of work: raise it when results change
   JobFunction run;
   // Its last input is what the name of its result holds: the job fails where the name holds something else by
-  // the time it ends.
+  // the time it ends. A tile set keeps its thumbnail, so its tiles must stay.
   bool updates_result = false;
 };
 

@@ -146,6 +146,17 @@ absl::StatusOr<JobRecord> WorkerPool::Cancel(int64_t id, const std::string& with
   return record;
 }
 
+absl::Status WorkerPool::QueueThumbnail(Database& db, const v1::TileSet& tile_set) const {
+  const absl::StatusOr<int> version = KindVersion(std::string(kThumbnailKind));
+  if (!version.ok() || tile_set.has_thumbnail()) {
+    return absl::OkStatus();
+  }
+  TESSERA_ASSIGN_OR_RETURN(const TileSetId id, ParseTileSetName(tile_set.name()));
+  const NewJob job{std::string(kThumbnailKind), *version,          "",
+                   {tile_set.blob().sha256()},  ThumbnailName(id), OnTaken::kReplace};
+  return InsertJob(db, job, clock_()).status();
+}
+
 void WorkerPool::WorkerLoop() {
   while (true) {
     uint64_t wakes = 0;
@@ -291,7 +302,9 @@ absl::Status WorkerPool::Commit(const JobRecord& record, const JobOutput& output
 
 absl::Status WorkerPool::CommitRows(Database& db, const JobRecord& record, const FinishedWork& work) {
   const std::string& name = record.job.result_name();
-  if (const auto material = ParseMaterialName(name); material.ok()) {
+  if (const auto drawn = ParseThumbnailName(name); drawn.ok()) {
+    TESSERA_RETURN_IF_ERROR(PutThumbnail(db, *drawn, record.inputs.back(), work.blob_sha256, clock_()));
+  } else if (const auto material = ParseMaterialName(name); material.ok()) {
     v1::Material message;
     if (!message.ParseFromString(work.message)) {
       return absl::InternalError("the job described its result as something else than a material");
@@ -309,9 +322,13 @@ absl::Status WorkerPool::CommitRows(Database& db, const JobRecord& record, const
       if (now.blob().sha256() != record.inputs.back()) {
         return absl::FailedPreconditionError(absl::StrCat(name, " was replaced meanwhile"));
       }
+      if (now.has_thumbnail()) {
+        *message.mutable_thumbnail() = now.thumbnail();
+      }
     }
-    TESSERA_RETURN_IF_ERROR(
-        PutTileSet(db, id, work.blob_sha256, std::move(message), record.on_taken, clock_()).status());
+    TESSERA_ASSIGN_OR_RETURN(const v1::TileSet put, PutTileSet(db, id, work.blob_sha256, std::move(message),
+                                                               record.on_taken, clock_()));
+    TESSERA_RETURN_IF_ERROR(QueueThumbnail(db, put));
   }
   return FinishJob(db, record.id, record.lease_token, events_.NextSequence(record.id), work, clock_());
 }

@@ -47,6 +47,9 @@ class WorkerPool {
 
   // A queued job may be there.
   void Wake();
+  // Inside the caller's transaction, which puts the tile set: queues the job that draws its thumbnail, unless
+  // it has one or no such kind is registered. Wake() afterwards.
+  [[nodiscard]] absl::Status QueueThumbnail(Database& db, const v1::TileSet& tile_set) const;
   // Ends a queued job at once. A running one is asked to stop; if it has not after 800 ms it is CANCELLED all
   // the same and whatever it still makes is thrown away. With a request_id, only takes back that call: the
   // job goes on while others want it. Errors: NOT_FOUND.

@@ -112,8 +112,9 @@ absl::StatusOr<v1::TileSet> TileSetsService::CreateTileSet(const v1::CreateTileS
         TESSERA_ASSIGN_OR_RETURN(
             response, PutTileSet(db, id, request.blob_sha256(), description,
                                  request.replace() ? OnTaken::kReplace : OnTaken::kRefuse, backend_.clock()));
-        return absl::OkStatus();
+        return backend_.pool.QueueThumbnail(db, response);
       }));
+  backend_.pool.Wake();
   return response;
 }
 

@@ -1,11 +1,13 @@
 """The command line as a newcomer meets it: every noun once, through a real socket, from generating a material to the
 pictures of a re-dressed mesh."""
 
+import contextlib
 import csv
 import json
 import os
 import re
 import signal
+import sqlite3
 import subprocess
 import xml.etree.ElementTree
 
@@ -301,6 +303,29 @@ class MainJobTest(harness.CommandTest):
                               "--force", "--name", "too-large", "--json")
         self.assertIn(result.code, (5, 6), result)
         self.assertEqual(json.loads(result.err.splitlines()[-1])["error"]["reason"], "MATERIAL_TOO_SMALL", result)
+
+    def test_d_thumbnail(self):
+        """Made by a job of its own, kept by another certificate, and missing where the catalog is older."""
+        self.run_ok("tileset", "thumbnail", "surface-96/skin", "-o", "thumbnail.png")
+        picture = (self.folder / "thumbnail.png").read_bytes()
+        width, height, colours = self.picture("thumbnail.png")
+        self.assertEqual((width, height), (128, 128))
+        self.assertGreater(colours, 20)
+        self.assertEqual(self.run_json("tileset", "show", "surface-96/skin")["thumbnail"]["size_bytes"], len(picture))
+        self.assertIn("thumbnail", {job["kind"] for job in self.run_json("job", "list")["jobs"]})
+        self.assertEqual(self.tessera("tileset", "thumbnail", "surface-96/skin", "-o", "thumbnail.exr").code, 2)
+
+        self.assertEqual(self.server.stop(), 0, self.server.log_text())
+        with contextlib.closing(sqlite3.connect(self.server.folder / "data" / "catalog.sqlite")) as catalog, catalog:
+            catalog.execute("UPDATE tile_sets SET thumbnail_sha256 = NULL WHERE name = 'skin'")
+        self.server.start()
+        self.assertIsNone(self.run_json("tileset", "show", "surface-96/skin")["thumbnail"])
+        self.assert_fails(4, "tileset", "thumbnail", "surface-96/skin", "-o", "none.png", reason="NOT_FOUND",
+                          says="has no thumbnail")
+        self.assertFalse((self.folder / "none.png").exists())
+        self.run_ok("tileset", "certify", "surface-96/skin", "--full")
+        self.run_ok("tileset", "thumbnail", "surface-96/skin", "-o", "again.png")
+        self.assertEqual((self.folder / "again.png").read_bytes(), picture)
 
     def test_d_synthesize_by_a_recipe(self):
         feature = {"name": "spot", "rectangle": [20, 20, 12, 12], "seeds": {"feature": [[[24, 26], [27, 26]]]}}

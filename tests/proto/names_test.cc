@@ -14,6 +14,10 @@ TEST(NamesTest, WhatIsMadeIsParsed) {
   const TileSetId id{"surface-96", "wool"};
   EXPECT_EQ(TileSetName(id), "arrangements/surface-96/tileSets/wool");
   EXPECT_EQ(*ParseTileSetName(TileSetName(id)), id);
+  EXPECT_EQ(ThumbnailName(id), "arrangements/surface-96/tileSets/wool/thumbnail");
+  EXPECT_EQ(*ParseThumbnailName(ThumbnailName(id)), id);
+  EXPECT_FALSE(ParseThumbnailName(TileSetName(id)).ok());
+  EXPECT_FALSE(ParseTileSetName(ThumbnailName(id)).ok());
 }
 
 TEST(NamesTest, IllegalNamesAreRefused) {

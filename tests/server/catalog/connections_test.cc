@@ -7,6 +7,7 @@
 
 #include "proto/wire/status.h"
 #include "server/catalog/migrations.h"
+#include "server/catalog/resources.h"
 #include "server/catalog/storage_error.h"
 #include "tests/server/support/open_catalog.h"
 #include "tests/support/temp_folder.h"
@@ -81,6 +82,29 @@ TEST(MigrationsTest, OlderCatalogsAreBroughtUpAndNewerOnesRefused) {
   const absl::Status newer = Migrate(*db, first);
   EXPECT_EQ(newer.code(), absl::StatusCode::kFailedPrecondition);
   EXPECT_NE(newer.message().find("schema version 2"), absl::string_view::npos) << newer;
+}
+
+TEST(MigrationsTest, TileSetsOfVersionTwoHaveNoThumbnail) {
+  TempFolder folder;
+  const std::string sha256(64, 'a');
+  {
+    auto db = Database::Open(folder.path() / "catalog.sqlite", OpenMode::kReadWrite);
+    ASSERT_TRUE(db.ok()) << db.status();
+    ASSERT_TRUE(Migrate(*db, SchemaScripts().first(2)).ok());
+    ASSERT_TRUE(db->Run("INSERT INTO blobs VALUES (?, 1, x'00', 1)", sha256).ok());
+    ASSERT_TRUE(db->Run("INSERT INTO tile_sets VALUES ('plane-16', 'wool', ?, 'x', 64, 16, 16, 9, 'dsh', '', "
+                        "'', '', '', '', 1)",
+                        sha256)
+                    .ok());
+  }
+  OpenCatalog catalog(folder.path());
+  const TileSetId id{"plane-16", "wool"};
+  const auto old = catalog.Write<v1::TileSet>([&](Database& db) { return GetTileSet(db, id); });
+  ASSERT_TRUE(old.ok()) << old.status();
+  EXPECT_EQ(old->num_btfels(), 9u);
+  EXPECT_FALSE(old->has_thumbnail());
+  EXPECT_TRUE(
+      catalog.connections->Write([&](Database& db) { return PutThumbnail(db, id, sha256, sha256, 2); }).ok());
 }
 
 TEST(MigrationsTest, AFailedMigrationChangesNothing) {

@@ -109,6 +109,45 @@ TEST_F(ResourcesTest, TileSetsComeInPagesByArrangementAndName) {
             "surface-96/tileSets/b ");
 }
 
+TEST_F(ResourcesTest, AThumbnailLivesAsLongAsItsTileSet) {
+  const TileSetId id{"plane-16", "wool"};
+  const std::string picture = *catalog_.blobs->Put("picture");
+  const auto put_thumbnail = [&](const std::string& of) {
+    return catalog_.connections->Write(
+        [&](Database& db) { return PutThumbnail(db, id, of, picture, catalog_.now_ms); });
+  };
+  const auto get = [&] {
+    return catalog_.Write<v1::TileSet>([&](Database& db) { return GetTileSet(db, id); });
+  };
+  EXPECT_TRUE(absl::IsNotFound(put_thumbnail(blob_)));
+  ASSERT_TRUE(PutTiles(id, blob_).ok());
+  EXPECT_FALSE(get()->has_thumbnail());
+  EXPECT_TRUE(absl::IsFailedPrecondition(put_thumbnail(other_blob_)));
+  ASSERT_TRUE(put_thumbnail(blob_).ok());
+  EXPECT_EQ(get()->thumbnail().sha256(), picture);
+  EXPECT_EQ(get()->thumbnail().size_bytes(), 7u);
+
+  catalog_.now_ms += 10 * kUnnamedBlobKeptMs;
+  ASSERT_TRUE(catalog_.blobs->CollectGarbage().ok());
+  EXPECT_TRUE(catalog_.blobs->Get(picture).ok());
+
+  // Another tile set under the name has another picture, or none yet; the old one stays for a day.
+  ASSERT_TRUE(catalog_
+                  .Write<v1::TileSet>([&](Database& db) {
+                    return PutTileSet(db, id, blob_, {}, OnTaken::kReplace, catalog_.now_ms);
+                  })
+                  .ok());
+  EXPECT_FALSE(get()->has_thumbnail());
+  ASSERT_TRUE(put_thumbnail(blob_).ok());
+  ASSERT_TRUE(
+      catalog_.connections->Write([&](Database& db) { return DeleteTileSet(db, id, catalog_.now_ms); }).ok());
+  ASSERT_TRUE(catalog_.blobs->CollectGarbage().ok());
+  EXPECT_TRUE(catalog_.blobs->Get(picture).ok());
+  catalog_.now_ms += kUnnamedBlobKeptMs + 1;
+  ASSERT_TRUE(catalog_.blobs->CollectGarbage().ok());
+  EXPECT_FALSE(catalog_.blobs->Get(picture).ok());
+}
+
 TEST_F(ResourcesTest, TokensBelongToOneList) {
   EXPECT_EQ(ParsePage("a", 0, "")->size, kDefaultPageSize);
   EXPECT_EQ(ParsePage("a", 5, PageToken("a", "key"))->after, "key");

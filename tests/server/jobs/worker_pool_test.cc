@@ -8,6 +8,7 @@
 #include <gtest/gtest.h>
 #include <spdlog/sinks/null_sink.h>
 
+#include "proto/wire/names.h"
 #include "proto/wire/status.h"
 #include "tests/server/support/open_catalog.h"
 #include "tests/support/temp_folder.h"
@@ -23,6 +24,9 @@ constexpr milliseconds kCancelLimit{1000};
 constexpr std::chrono::seconds kPatience{20};
 
 JobOutput OutputOf(const std::string& text) {
+  if (text == "ugly" || text.starts_with("tiles")) {
+    return {"blob of " + text, v1::TileSet()};
+  }
   v1::Material message;
   message.set_codec(text);
   return {"blob of " + text, message};
@@ -80,10 +84,21 @@ class WorkerPoolTest : public testing::Test {
                               [](const JobInput& input, const JobContext&) -> absl::StatusOr<JobOutput> {
                                 return JobOutput{"blob of " + input.params, v1::TileSet()};
                               },
-                              /*updates_result=*/true}},
+                              /*updates_result=*/true},
+                             {std::string(kThumbnailKind), 1,
+                              [this](const JobInput& input, const JobContext& context) {
+                                return RunTestThumbnail(input, context);
+                              }}},
         [this] { return catalog_.now_ms; },
         std::make_shared<spdlog::logger>("test", std::make_shared<spdlog::sinks::null_sink_mt>()));
     ASSERT_TRUE(pool_->Start(num_workers).ok());
+  }
+  absl::StatusOr<JobOutput> RunTestThumbnail(const JobInput& input, const JobContext& context) {
+    TESSERA_ASSIGN_OR_RETURN(const std::string bytes, context.blobs->ReadAll(input.inputs.back(), 100));
+    if (bytes == "blob of ugly") {
+      return absl::InternalError("cannot be drawn");
+    }
+    return JobOutput{"picture of " + bytes, v1::TileSet()};
   }
   // A catalog that cannot tell any more what became of a job.
   absl::Status DeleteJobs() {
@@ -321,6 +336,55 @@ TEST_F(WorkerPoolTest, AnUpdateOfWhatWasReplacedMeanwhileFails) {
   EXPECT_EQ(late.state(), v1::Job::FAILED);
   EXPECT_EQ(late.error().message(), "arrangements/plane-16/tileSets/wool was replaced meanwhile");
   EXPECT_EQ(held(), "blob of once");
+}
+
+TEST_F(WorkerPoolTest, ANewTileSetGetsAThumbnailWhichAnUpdateKeeps) {
+  StartPool(1);
+  const TileSetId id{"plane-16", "wool"};
+  const auto queued = [&](const std::string& params, const std::string& kind,
+                          std::vector<std::string> inputs) {
+    const auto record = catalog_.Write<JobRecord>([&](Database& db) {
+      return InsertJob(db, {kind, 1, params, std::move(inputs), TileSetName(id), OnTaken::kReplace, ""},
+                       catalog_.now_ms);
+    });
+    EXPECT_TRUE(record.ok()) << record.status();
+    pool_->Wake();
+    return record->id;
+  };
+  const auto get = [&] {
+    return *catalog_.Write<v1::TileSet>([&](Database& db) { return GetTileSet(db, id); });
+  };
+  const auto picture = [&] { return *catalog_.blobs->ReadAll(get().thumbnail().sha256(), 100); };
+  // The thumbnail's job is in the catalog once the tile set is.
+  const int64_t made = queued("tiles wool", "test", {});
+  EXPECT_EQ(WaitForEnd(made).state(), v1::Job::SUCCEEDED);
+  const v1::Job drawn = WaitForEnd(made + 1);
+  EXPECT_EQ(drawn.state(), v1::Job::SUCCEEDED);
+  EXPECT_EQ(drawn.kind(), "thumbnail");
+  EXPECT_EQ(drawn.result_name(), "arrangements/plane-16/tileSets/wool/thumbnail");
+  EXPECT_EQ(picture(), "picture of blob of tiles wool");
+
+  EXPECT_EQ(WaitForEnd(queued("certified", "update", {get().blob().sha256()})).state(), v1::Job::SUCCEEDED);
+  EXPECT_EQ(*catalog_.blobs->ReadAll(get().blob().sha256(), 100), "blob of certified");
+  EXPECT_EQ(picture(), "picture of blob of tiles wool");
+
+  const int64_t remade = queued("tiles silk", "test", {});
+  EXPECT_EQ(WaitForEnd(remade).state(), v1::Job::SUCCEEDED);
+  EXPECT_EQ(WaitForEnd(remade + 1).state(), v1::Job::SUCCEEDED);
+  EXPECT_EQ(picture(), "picture of blob of tiles silk");
+}
+
+TEST_F(WorkerPoolTest, AThumbnailThatFailsLeavesItsTileSet) {
+  StartPool(1);
+  const TileSetId id{"plane-16", "wool"};
+  const int64_t made = Insert(TileSetName(id), "ugly");
+  EXPECT_EQ(WaitForEnd(made).state(), v1::Job::SUCCEEDED);
+  EXPECT_EQ(WaitForEnd(made + 1).state(), v1::Job::FAILED);
+  const auto get = [&] {
+    return catalog_.Write<v1::TileSet>([&](Database& db) { return GetTileSet(db, id); });
+  };
+  ASSERT_TRUE(get().ok());
+  EXPECT_FALSE(get()->has_thumbnail());
 }
 
 TEST_F(WorkerPoolTest, ANameTakenMeanwhileFailsTheJob) {

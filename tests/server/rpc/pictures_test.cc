@@ -4,11 +4,11 @@
 #include <gtest/gtest.h>
 
 #include "btf/image/image_io.h"
-
 #include "btf/wang/arrangement.h"
 #include "btf/wang/dressing.h"
 #include "btf/wang/tile_set.h"
 #include "proto/wire/convert.h"
+#include "server/jobs/thumbnail_job.h"
 #include "tests/server/support/server_fixture.h"
 
 namespace tessera {
@@ -76,6 +76,62 @@ TileSet TinyTileSet() {
   tile_set.btfels = material.btfels;
   tile_set.btfels.codes.resize(3);
   return tile_set;
+}
+
+class OneBlob final : public BlobReader {
+ public:
+  explicit OneBlob(std::string bytes) : bytes_(std::move(bytes)) {}
+  absl::StatusOr<std::string> ReadAll(std::string_view /*sha256*/, uint64_t /*limit*/) const override {
+    return bytes_;
+  }
+  absl::Status CopyTo(std::string_view /*sha256*/, const std::filesystem::path& /*file*/) const override {
+    return absl::UnimplementedError("nothing is copied");
+  }
+
+ private:
+  const std::string bytes_;
+};
+
+TEST_F(ServerTest, AThumbnailIsDrawnOfEachNewTileSet) {
+  v1::CreateTileSetRequest create;
+  create.set_name("arrangements/surface-96/tileSets/tiny");
+  create.set_blob_sha256(stubs_->Upload(*SerializeTileSet(TinyTileSet())));
+  const auto put = [&] {
+    return Stubs::Call(&v1::TileSets::Stub::CreateTileSet, *stubs_->tile_sets, create);
+  };
+  ASSERT_TRUE(put().ok());
+  const auto jobs = Stubs::Call(&v1::Jobs::Stub::ListJobs, *stubs_->jobs, v1::ListJobsRequest());
+  ASSERT_EQ(jobs->jobs_size(), 1);
+  EXPECT_EQ(jobs->jobs(0).kind(), "thumbnail");
+  EXPECT_EQ(jobs->jobs(0).result_name(), create.name() + "/thumbnail");
+  const auto ended = stubs_->Wait(jobs->jobs(0).name());
+  EXPECT_EQ(ended->state(), v1::Job::SUCCEEDED) << ended->error().message();
+  const auto thumbnail = [&] {
+    v1::GetTileSetRequest get;
+    get.set_name(create.name());
+    return Stubs::Call(&v1::TileSets::Stub::GetTileSet, *stubs_->tile_sets, get)->thumbnail();
+  };
+  const auto png = stubs_->Download(thumbnail().sha256());
+  ASSERT_TRUE(png.ok()) << png.status();
+  EXPECT_EQ(png->size(), thumbnail().size_bytes());
+  const auto picture = DecodeImage(std::as_bytes(std::span(*png)), "thumbnail.png", std::nullopt);
+  ASSERT_TRUE(picture.ok()) << picture.status();
+  EXPECT_EQ(picture->width, 128);
+  EXPECT_EQ(picture->height, 128);
+  EXPECT_EQ(picture->channels, 3);
+  // One BTFel, seen from about its normal all over: no texel is far from the middle one, and none is black.
+  const float middle = picture->pixels[3 * (64 * 128 + 64)];
+  EXPECT_GT(middle, 0.0F);
+  for (const size_t pixel : {size_t{0}, size_t{127}, size_t{127 * 128}, size_t{128 * 128 - 1}}) {
+    EXPECT_NEAR(picture->pixels[3 * pixel], middle, 0.5F * middle) << pixel;
+  }
+  // Drawn again, the same bytes.
+  const OneBlob reader(*SerializeTileSet(TinyTileSet()));
+  JobContext context;
+  context.blobs = &reader;
+  const auto again = RunThumbnailJob({"", {create.blob_sha256()}}, context);
+  ASSERT_TRUE(again.ok()) << again.status();
+  EXPECT_EQ(again->blob, *png);
 }
 
 TEST_F(ServerTest, PicturesAreDrawn) {
