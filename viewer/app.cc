@@ -84,8 +84,9 @@ void App::TakeLoaded() {
   for (LoadEvent& event : loader_->Take()) {
     state_->Apply(std::move(event));
   }
-  for (auto& [name, tile_set] : state_->TakeThumbnailSets()) {
-    scene_->AskThumbnail(name, std::move(tile_set));
+  for (const auto& [sha256, pixels] : state_->TakeThumbnails()) {
+    thumbnails_[sha256] =
+        std::make_unique<GuiTexture>(gl_state_->gl, pixels.width, pixels.height, pixels.rgba);
   }
   facts_.activity = loader_->Activity();
 }
@@ -93,13 +94,6 @@ void App::TakeLoaded() {
 void App::TakePictures() {
   if (std::optional<ScenePicture> picture = scene_->TakePicture()) {
     TakePicture(*std::move(picture));
-  }
-  for (const Thumbnail& thumbnail : scene_->TakeThumbnails()) {
-    const TileSetEntry* const entry = state_->EntryOf(thumbnail.name);
-    if (entry != nullptr && thumbnail.status.ok()) {
-      thumbnails_[entry->sha256] = std::make_unique<GuiTexture>(
-          gl_state_->gl, thumbnail.pixels.width, thumbnail.pixels.height, thumbnail.pixels.rgba);
-    }
   }
   facts_.is_drawing = !scene_->IsIdle();
 }

@@ -81,15 +81,18 @@ void Loader::StopRunningLocked(LoadEvent::Kind kind) {
   }
 }
 
-void Loader::LoadForThumbnail(std::string name) {
+void Loader::LoadThumbnail(TileSetEntry entry) {
   {
     const std::lock_guard lock(mutex_);
+    const auto is_same = [&](const TileSetEntry& other) {
+      return other.thumbnail_sha256 == entry.thumbnail_sha256;
+    };
     const bool runs =
-        running_.has_value() && running_->kind == LoadEvent::Kind::kThumbnail && running_->name == name;
-    if (runs || std::find(thumbnails_.begin(), thumbnails_.end(), name) != thumbnails_.end()) {
+        running_.has_value() && running_->kind == LoadEvent::Kind::kThumbnail && is_same(running_->entry);
+    if (runs || std::any_of(thumbnails_.begin(), thumbnails_.end(), is_same)) {
       return;
     }
-    thumbnails_.push_back(std::move(name));
+    thumbnails_.push_back(std::move(entry));
   }
   changed_.notify_one();
 }
@@ -124,7 +127,9 @@ std::optional<Loader::Request> Loader::NextLocked() {
   if (thumbnails_.empty()) {
     return std::nullopt;
   }
-  Request request{.kind = LoadEvent::Kind::kThumbnail, .name = std::move(thumbnails_.front())};
+  Request request{.kind = LoadEvent::Kind::kThumbnail,
+                  .name = thumbnails_.front().name,
+                  .entry = std::move(thumbnails_.front())};
   thumbnails_.pop_front();
   return request;
 }
@@ -167,8 +172,11 @@ LoadEvent Loader::Perform(const Request& request, const RunContext& context) {
       take(source_->List(request.name, context), event.entries);
       break;
     case LoadEvent::Kind::kTileSet:
-    case LoadEvent::Kind::kThumbnail:
       take(source_->Fetch(request.name, context), event.tile_set);
+      break;
+    case LoadEvent::Kind::kThumbnail:
+      event.thumbnail_sha256 = request.entry.thumbnail_sha256;
+      take(source_->FetchThumbnail(request.entry, context), event.thumbnail);
       break;
   }
   event.load_ms = std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - begin).count();
@@ -183,7 +191,7 @@ void Loader::Finish(const Request& request, LoadEvent event) {
     if (!running_stop_.stop_requested()) {
       events_.push_back(std::move(event));
     } else if (request.kind == LoadEvent::Kind::kThumbnail) {
-      thumbnails_.push_front(request.name);
+      thumbnails_.push_front(request.entry);
     }
   }
   if (wake_) {

@@ -37,7 +37,9 @@ struct LoadEvent {
   absl::Status status;
   Surface surface;
   std::vector<TileSetEntry> entries;
-  std::shared_ptr<const TileSet> tile_set;  // of kTileSet and kThumbnail
+  std::shared_ptr<const TileSet> tile_set;
+  Pixels thumbnail;
+  std::string thumbnail_sha256;
   double load_ms = 0.0;
 };
 
@@ -55,7 +57,7 @@ class Loader {
   void List(std::string arrangement);
   void Show(std::string name);
   // Nothing when it is queued already.
-  void LoadForThumbnail(std::string name);
+  void LoadThumbnail(TileSetEntry entry);
   // Drops the tile set to show, queued or running.
   void CancelShow();
 
@@ -71,6 +73,7 @@ class Loader {
     LoadEvent::Kind kind = LoadEvent::Kind::kSurface;
     std::string name;
     SurfaceChoice choice;
+    TileSetEntry entry;  // of kThumbnail
   };
 
   void Ask(std::optional<Request>& slot, Request request);
@@ -87,7 +90,7 @@ class Loader {
   std::optional<Request> surface_;
   std::optional<Request> list_;
   std::optional<Request> show_;
-  std::deque<std::string> thumbnails_;
+  std::deque<TileSetEntry> thumbnails_;
   std::optional<Request> running_;
   std::stop_source running_stop_;
   std::string activity_;

@@ -12,13 +12,11 @@
 #include <chrono>
 #include <condition_variable>
 #include <cstdint>
-#include <deque>
 #include <functional>
 #include <memory>
 #include <mutex>
 #include <optional>
 #include <stop_token>
-#include <string>
 #include <thread>
 #include <vector>
 
@@ -26,16 +24,10 @@
 
 #include "btf/render/offscreen_context.h"
 #include "btf/render/preview.h"
+#include "viewer/pixels.h"
 #include "viewer/recent.h"
 
 namespace tessera::viewer {
-
-// 8 bits, sRGB, opaque.
-struct Pixels {
-  int width = 0;
-  int height = 0;
-  std::vector<uint8_t> rgba;  // [height][width][4], row 0 on top
-};
 
 struct SceneRequest {
   std::shared_ptr<const Dressing> dressing;
@@ -56,13 +48,6 @@ struct ScenePicture {
   double texels_per_pixel = 0.0;  // along a pixel's side
 };
 
-struct Thumbnail {
-  std::string name;
-  absl::Status status;
-  Pixels pixels;
-};
-
-inline constexpr int kThumbnailSide = 72;  // pixels
 // What stays in GL: at most this many tile sets, of at most this size together.
 inline constexpr size_t kMostPrepared = 12;
 inline constexpr uint64_t kMostPreparedBytes = uint64_t{1} << 30;
@@ -79,10 +64,7 @@ class SceneView {
 
   // Returns the request's number, from 1 on.
   uint64_t Ask(SceneRequest request);
-  // A picture of a few tiles, after what else is asked for.
-  void AskThumbnail(std::string name, std::shared_ptr<const TileSet> tile_set);
   [[nodiscard]] std::optional<ScenePicture> TakePicture();
-  [[nodiscard]] std::vector<Thumbnail> TakeThumbnails();
   // Nothing waits, is drawn or is to be taken.
   [[nodiscard]] bool IsIdle() const;
 
@@ -101,8 +83,6 @@ class SceneView {
   void Run(std::stop_token stop);
   ScenePicture Draw(const SceneRequest& request, const RunContext& context);
   absl::StatusOr<GlPreview*> Prepare(const SceneRequest& request, double& prepare_ms);
-  Thumbnail DrawThumbnail(const std::string& name, std::shared_ptr<const TileSet> tile_set,
-                          const RunContext& context);
 
   OffscreenContext& context_;
   const std::function<void()> wake_;
@@ -111,9 +91,7 @@ class SceneView {
   std::condition_variable_any changed_;
   std::optional<SceneRequest> request_;
   uint64_t num_asked_ = 0;
-  std::deque<std::pair<std::string, std::shared_ptr<const TileSet>>> thumbnail_requests_;
   std::optional<ScenePicture> picture_;
-  std::vector<Thumbnail> thumbnails_;
   bool busy_ = false;
   std::jthread thread_;  // last: it uses all of the above
 };

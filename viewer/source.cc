@@ -11,6 +11,7 @@
 
 #include "btf/base/atomic_file.h"
 #include "btf/base/status_macros.h"
+#include "btf/image/image_io.h"
 #include "btf/remesh/remesh.h"
 #include "btf/remesh/triangle_mesh_io.h"
 #include "btf/wang/arrangement.h"
@@ -153,7 +154,9 @@ TileSetEntry EntryOf(const v1::TileSet& tile_set, const CodecErrors& errors) {
           .seam_ratio_borders = NumberAt(certificate, "/borders/ratio"),
           .seam_ratio_insides = NumberAt(certificate, "/insides/ratio"),
           .codec_error = ErrorOfMaterial(metadata, errors),
-          .warnings = WarningsOf(metadata)};
+          .warnings = WarningsOf(metadata),
+          .thumbnail_sha256 = tile_set.thumbnail().sha256(),
+          .thumbnail_bytes = tile_set.thumbnail().size_bytes()};
 }
 
 class ServerSource final : public Source {
@@ -187,6 +190,21 @@ class ServerSource final : public Source {
     TESSERA_RETURN_IF_ERROR(Connect(context));
     TESSERA_ASSIGN_OR_RETURN(TileSet tile_set, client_->FetchTileSet(full_name, context));
     return std::make_shared<const TileSet>(std::move(tile_set));
+  }
+
+  absl::StatusOr<Pixels> FetchThumbnail(const TileSetEntry& entry, const RunContext& context) override {
+    TESSERA_RETURN_IF_ERROR(Connect(context));
+    v1::Blob blob;
+    blob.set_sha256(entry.thumbnail_sha256);
+    blob.set_size_bytes(entry.thumbnail_bytes);
+    TESSERA_ASSIGN_OR_RETURN(const std::string bytes, client_->FetchBlob(blob, context));
+    TESSERA_ASSIGN_OR_RETURN(const Image picture,
+                             DecodeImage(std::as_bytes(std::span(bytes)), entry.name + ".png", std::nullopt));
+    if (std::max(picture.width, picture.height) > kMostThumbnailSide) {
+      return absl::InvalidArgumentError(absl::StrCat("thumbnail of ", entry.name, ": ", picture.width, "x",
+                                                     picture.height, ", at most ", kMostThumbnailSide));
+    }
+    return PixelsOf(picture);
   }
 
  private:

@@ -13,6 +13,7 @@
 #include "btf/base/run_context.h"
 #include "btf/wang/dressing.h"
 #include "btf/wang/tile_set.h"
+#include "viewer/pixels.h"
 
 namespace tessera::viewer {
 
@@ -45,6 +46,8 @@ struct TileSetEntry {
   // longer on the server.
   std::optional<double> codec_error;
   std::vector<std::string> warnings;  // of its synthesis
+  std::string thumbnail_sha256;       // empty: the server has none yet
+  uint64_t thumbnail_bytes = 0;
 };
 
 // Used by one thread at a time.
@@ -60,7 +63,12 @@ class Source {
   // `name` as in TileSetEntry. Errors: those of Client::FetchTileSet.
   [[nodiscard]] virtual absl::StatusOr<std::shared_ptr<const TileSet>> Fetch(const std::string& name,
                                                                              const RunContext& context) = 0;
+  // The picture that the server made of it. Errors: those of Client::FetchBlob and of decoding;
+  // INVALID_ARGUMENT where a side is longer than kMostThumbnailSide.
+  [[nodiscard]] virtual absl::StatusOr<Pixels> FetchThumbnail(const TileSetEntry& entry,
+                                                              const RunContext& context) = 0;
 };
+inline constexpr int kMostThumbnailSide = 1024;  // pixels
 
 // The server at HOST:PORT, which is connected to when first asked, and again after it went away.
 [[nodiscard]] std::unique_ptr<Source> MakeServerSource(std::string address);

@@ -101,12 +101,7 @@ void ViewerState::ApplyThumbnail(LoadEvent event) {
   if (!event.status.ok()) {
     return;  // the list shows the name all the same; a click tells what is wrong
   }
-  const TileSetEntry* const entry = EntryOf(event.name);
-  const uint64_t size = SizeInMemory(*event.tile_set);
-  if (entry != nullptr && !IsResident(*entry) && resident_.HasRoomFor(size)) {
-    resident_.Put(entry->sha256, event.tile_set, size);
-  }
-  thumbnail_sets_.emplace_back(std::move(event.name), std::move(event.tile_set));
+  thumbnails_.emplace_back(std::move(event.thumbnail_sha256), std::move(event.thumbnail));
 }
 
 void ViewerState::ShowSet(const std::string& name, std::shared_ptr<const TileSet> tile_set) {
@@ -126,6 +121,7 @@ void ViewerState::Refresh() {
     Begin();
     return;
   }
+  thumbnails_wanted_.clear();  // what could not be fetched may be there now
   loader_.List(arrangement_);
   if (shown_ == nullptr && !selected_.empty()) {
     Select(std::string(selected_));
@@ -149,8 +145,8 @@ void ViewerState::Select(const std::string& name) {
 }
 
 void ViewerState::WantThumbnail(const TileSetEntry& entry) {
-  if (thumbnails_wanted_.insert(entry.sha256).second) {
-    loader_.LoadForThumbnail(entry.name);
+  if (!entry.thumbnail_sha256.empty() && thumbnails_wanted_.insert(entry.thumbnail_sha256).second) {
+    loader_.LoadThumbnail(entry);
   }
 }
 
@@ -187,8 +183,8 @@ const TileSetEntry* ViewerState::EntryOf(std::string_view name) const {
   return found == entries_.end() ? nullptr : &*found;
 }
 
-std::vector<std::pair<std::string, std::shared_ptr<const TileSet>>> ViewerState::TakeThumbnailSets() {
-  return std::exchange(thumbnail_sets_, {});
+std::vector<std::pair<std::string, Pixels>> ViewerState::TakeThumbnails() {
+  return std::exchange(thumbnails_, {});
 }
 
 }  // namespace tessera::viewer

@@ -55,7 +55,8 @@ class ViewerState {
   // Shows this tile set: at once when it is resident, else when the loader brings it; what is shown stays
   // until then. Clicks that follow replace it.
   void Select(const std::string& name);
-  // The listed tile set is in view and has no picture: asks for it, once.
+  // The listed tile set is in view and its thumbnail is not here: asks for it, once until the list is asked
+  // for again. Nothing where the server has none.
   void WantThumbnail(const TileSetEntry& entry);
   // Of the picture, pixels: what the surface is framed in when it comes.
   void SetSceneSize(int width, int height);
@@ -83,8 +84,8 @@ class ViewerState {
   // How long the last tile set took from the server or the disk; 0 when it was resident.
   [[nodiscard]] double load_ms() const { return load_ms_; }
 
-  // Tile sets that came for their thumbnails, to be drawn; emptied by the call.
-  [[nodiscard]] std::vector<std::pair<std::string, std::shared_ptr<const TileSet>>> TakeThumbnailSets();
+  // Thumbnails that came, with their digests; emptied by the call.
+  [[nodiscard]] std::vector<std::pair<std::string, Pixels>> TakeThumbnails();
 
   OrbitCamera camera;
   LightAngles light;
@@ -111,7 +112,7 @@ class ViewerState {
   double load_ms_ = 0.0;
   Recent<std::string, std::shared_ptr<const TileSet>> resident_{kMostResident, kMostResidentBytes};
   std::set<std::string> thumbnails_wanted_;  // by digest
-  std::vector<std::pair<std::string, std::shared_ptr<const TileSet>>> thumbnail_sets_;
+  std::vector<std::pair<std::string, Pixels>> thumbnails_;
 };
 
 // Bytes that a tile set holds in memory, about.

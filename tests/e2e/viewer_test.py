@@ -43,7 +43,8 @@ class ViewerTest(harness.CommandTest):
         super().setUpClass()
         for kind in ("holes", "weave"):
             for words in (["material", "generate", kind, "--name", kind, *GENERATE],
-                          ["tileset", "synthesize", kind, *SYNTHESIZE]):
+                          ["tileset", "synthesize", kind, *SYNTHESIZE],
+                          ["tileset", "thumbnail", f"surface-96/{kind}", "-o", f"{kind}-thumbnail.png"]):
                 result = cls.tessera(*words)
                 assert result.code == 0, result
 

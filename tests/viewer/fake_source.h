@@ -6,10 +6,12 @@
 #include <map>
 #include <memory>
 #include <mutex>
+#include <set>
 #include <string>
 #include <utility>
 #include <vector>
 
+#include "btf/base/status_macros.h"
 #include "btf/wang/arrangement.h"
 #include "btf/wang/dress.h"
 #include "btf/wang/shapes.h"
@@ -72,9 +74,15 @@ class FakeServer {
     }
     return found->second;
   }
+  // Waits as Fetch does.
+  absl::StatusOr<Pixels> FetchThumbnail(const TileSetEntry& entry, const RunContext& context) {
+    TESSERA_RETURN_IF_ERROR(Fetch(entry.name, context).status());
+    return Pixels{1, 1, {1, 2, 3, 255}};
+  }
 
   // Before the loader begins.
   std::map<std::string, std::shared_ptr<const TileSet>> sets;
+  std::set<std::string> without_thumbnail;
   absl::Status list_status;
   absl::Status surface_status;
 
@@ -104,7 +112,10 @@ class FakeSource final : public Source {
     std::vector<TileSetEntry> entries;
     for (const auto& [name, tile_set] : server_.sets) {
       if (name.starts_with(arrangement + "/")) {
-        entries.push_back({.name = name, .sha256 = "digest of " + name});
+        const bool has_thumbnail = !server_.without_thumbnail.contains(name);
+        entries.push_back({.name = name,
+                           .sha256 = "digest of " + name,
+                           .thumbnail_sha256 = has_thumbnail ? "picture of " + name : ""});
       }
     }
     return entries;
@@ -112,6 +123,9 @@ class FakeSource final : public Source {
   absl::StatusOr<std::shared_ptr<const TileSet>> Fetch(const std::string& name,
                                                        const RunContext& context) override {
     return server_.Fetch(name, context);
+  }
+  absl::StatusOr<Pixels> FetchThumbnail(const TileSetEntry& entry, const RunContext& context) override {
+    return server_.FetchThumbnail(entry, context);
   }
 
  private:

@@ -77,10 +77,10 @@ TEST_F(LoaderTest, ErrorsComeAsEvents) {
 TEST_F(LoaderTest, ThumbnailsGiveWayAndComeAllTheSame) {
   server_.Hold("surface-96/a");
   const auto loader = MakeLoader();
-  loader->LoadForThumbnail("surface-96/a");
+  loader->LoadThumbnail({.name = "surface-96/a", .thumbnail_sha256 = "surface-96/a"});
   server_.WaitUntilFetching("surface-96/a");
-  loader->LoadForThumbnail("surface-96/a");  // it runs already
-  loader->LoadForThumbnail("surface-96/b");
+  loader->LoadThumbnail({.name = "surface-96/a", .thumbnail_sha256 = "surface-96/a"});  // it runs already
+  loader->LoadThumbnail({.name = "surface-96/b", .thumbnail_sha256 = "surface-96/b"});
   loader->Show("surface-96/c");
   server_.Release("surface-96/a");
   std::vector<std::string> names;
@@ -95,7 +95,7 @@ TEST_F(LoaderTest, EndsWhileItWorks) {
   auto loader = MakeLoader();
   loader->Show("surface-96/a");
   server_.WaitUntilFetching("surface-96/a");
-  loader->LoadForThumbnail("surface-96/b");
+  loader->LoadThumbnail({.name = "surface-96/b", .thumbnail_sha256 = "surface-96/b"});
   loader.reset();
   EXPECT_THAT(server_.fetched(), ElementsAre("surface-96/a"));
 }

@@ -118,16 +118,28 @@ TEST_F(ViewerStateTest, SaysWhatIsWrongWithTheMesh) {
   EXPECT_THAT(state_->messages()[0].text, HasSubstr("horse.obj: no such file"));
 }
 
-TEST_F(ViewerStateTest, ThumbnailsAreAskedForOnceAndMakeTheirTileSetsResident) {
+TEST_F(ViewerStateTest, ThumbnailsAreAskedForOnceAndOnlyWhereThereAre) {
+  server_.without_thumbnail = {"surface-96/a"};
   Begin();
+  const size_t fetched_before = server_.fetched().size();
   const TileSetEntry entry = *state_->EntryOf("surface-96/b");
   state_->WantThumbnail(entry);
   state_->WantThumbnail(entry);
+  state_->WantThumbnail(*state_->EntryOf("surface-96/a"));
   Settle();
-  EXPECT_THAT(state_->TakeThumbnailSets(), SizeIs(1));
-  EXPECT_TRUE(state_->IsResident(entry));
-  state_->Select("surface-96/b");
-  EXPECT_EQ(state_->shown_name(), "surface-96/b");
+  const auto thumbnails = state_->TakeThumbnails();
+  ASSERT_THAT(thumbnails, SizeIs(1));
+  EXPECT_EQ(thumbnails[0].first, "picture of surface-96/b");
+  EXPECT_EQ(thumbnails[0].second.width, 1);
+  EXPECT_EQ(server_.fetched().size(), fetched_before + 1);
+  EXPECT_FALSE(state_->IsResident(entry));
+  state_->WantThumbnail(entry);
+  Settle();
+  EXPECT_THAT(state_->TakeThumbnails(), SizeIs(0));
+  state_->Refresh();
+  state_->WantThumbnail(entry);
+  Settle();
+  EXPECT_THAT(state_->TakeThumbnails(), SizeIs(1));
 }
 
 TEST(RecentTest, TheOneNotUsedForLongestGoesFirst) {

@@ -30,7 +30,8 @@ struct ViewFacts {
   bool is_drawing = false;
 };
 
-// A column of tile sets: picture, name, codec and size. A click shows one.
+// A column of tile sets: picture, name, codec and size. A click shows one. `thumbnails` by their digest; grey
+// where there is none.
 void DrawTileSetPanel(const Rectangle& place, ViewerState& state,
                       const std::map<std::string, std::unique_ptr<GuiTexture>>& thumbnails);
 // The picture; dragging it orbits (left), pans (middle, or shift and left) and moves the light (right), the

@@ -1,12 +1,13 @@
 #include <fmt/format.h>
 
 #include "viewer/panels/panels.h"
-#include "viewer/scene_view.h"
 
 namespace tessera::viewer {
 namespace {
 
-constexpr float kRowHeight = static_cast<float>(kThumbnailSide) + 8.0F;
+constexpr float kThumbnailSide = 72.0F;  // as shown
+constexpr float kRowHeight = kThumbnailSide + 8.0F;
+constexpr ImU32 kPlaceholder = IM_COL32(70, 70, 72, 255);
 const ImVec4 kDim(0.65F, 0.66F, 0.68F, 1.0F);
 
 // "wool" of "surface-96/wool".
@@ -25,12 +26,12 @@ std::string StateOf(const ViewerState& state, const TileSetEntry& entry) {
 }
 
 void DrawThumbnail(ImVec2 corner, const GuiTexture* thumbnail) {
-  constexpr float kSide = static_cast<float>(kThumbnailSide);
-  const ImVec2 end(corner.x + kSide, corner.y + kSide);
+  const ImVec2 end(corner.x + kThumbnailSide, corner.y + kThumbnailSide);
   ImDrawList& draw = *ImGui::GetWindowDrawList();
   if (thumbnail != nullptr) {
     draw.AddImage(thumbnail->id(), corner, end);
   } else {
+    draw.AddRectFilled(corner, end, kPlaceholder);
     draw.AddRect(corner, end, ImGui::GetColorU32(ImGuiCol_Border));
   }
 }
@@ -47,7 +48,7 @@ void DrawEntry(ViewerState& state, const TileSetEntry& entry, const GuiTexture* 
   }
   const ImVec2 after = ImGui::GetCursorPos();
   DrawThumbnail(ImVec2(corner.x + 4.0F, corner.y + 4.0F), thumbnail);
-  const float text_x = local.x + static_cast<float>(kThumbnailSide) + 14.0F;
+  const float text_x = local.x + kThumbnailSide + 14.0F;
   const auto line = [&](int number) {
     ImGui::SetCursorPos(
         ImVec2(text_x, local.y + 6.0F + static_cast<float>(number) * ImGui::GetTextLineHeightWithSpacing()));
@@ -77,7 +78,7 @@ void DrawTileSetPanel(const Rectangle& place, ViewerState& state,
   ImGui::Separator();
   ImGui::BeginChild("entries");
   for (const TileSetEntry& entry : state.entries()) {
-    const auto thumbnail = thumbnails.find(entry.sha256);
+    const auto thumbnail = thumbnails.find(entry.thumbnail_sha256);
     DrawEntry(state, entry, thumbnail == thumbnails.end() ? nullptr : thumbnail->second.get());
   }
   ImGui::EndChild();
