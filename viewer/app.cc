@@ -16,7 +16,7 @@ namespace {
 
 constexpr float kLeftWidth = 270.0F;
 constexpr float kRightWidth = 300.0F;
-constexpr float kLightHeight = 250.0F;
+constexpr float kLightHeight = 330.0F;
 constexpr size_t kFramesMeasured = 30;
 constexpr char kPictureSubject[] = "picture";
 
@@ -113,6 +113,8 @@ void App::TakePicture(ScenePicture picture) {
   }
   facts_.draw_ms = picture.draw_ms;
   facts_.texels_per_pixel = picture.texels_per_pixel;
+  facts_.mips = picture.mips;
+  facts_.why_no_mips = picture.why_no_mips;
   if (picture.prepare_ms > 0.0) {
     facts_.prepare_ms = picture.prepare_ms;
   }
@@ -173,6 +175,7 @@ void App::AskForPicture() {
                      .target = camera.target,
                      .light = light.place,
                      .strength = state_->light.strength,
+                     .tone = state_->tone,
                      .width = static_cast<int>(scene_size_.x),
                      .height = static_cast<int>(scene_size_.y)};
   if (wanted == asked_) {
@@ -183,6 +186,7 @@ void App::AskForPicture() {
                .tile_set = state_->shown(),
                .camera = camera,
                .lights = {light},
+               .tone = state_->tone,
                .width = wanted.width,
                .height = wanted.height});
 }

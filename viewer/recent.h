@@ -44,10 +44,6 @@ class Recent {
     return entries_.front().value;
   }
 
-  [[nodiscard]] bool HasRoomFor(uint64_t cost) const {
-    return entries_.size() < max_count_ && cost <= max_cost_ - std::min(cost_, max_cost_);
-  }
-
   void Clear() {
     entries_.clear();
     cost_ = 0;

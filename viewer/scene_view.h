@@ -17,13 +17,16 @@
 #include <mutex>
 #include <optional>
 #include <stop_token>
+#include <string>
 #include <thread>
 #include <vector>
 
 #include <absl/status/status.h>
 
+#include "btf/image/tone_map.h"
 #include "btf/render/offscreen_context.h"
 #include "btf/render/preview.h"
+#include "viewer/mip_maker.h"
 #include "viewer/pixels.h"
 #include "viewer/recent.h"
 
@@ -34,9 +37,14 @@ struct SceneRequest {
   std::shared_ptr<const TileSet> tile_set;
   Camera camera;
   std::vector<Light> lights;
+  Tone tone;
   int width = 0;
   int height = 0;
 };
+
+// Of a picture: levels are drawn above kTexelsWithoutMips texels a pixel, once they are made.
+enum class MipUse { kNotNeeded, kComing, kDrawn, kNone };
+inline constexpr double kTexelsWithoutMips = 2.0;
 
 struct ScenePicture {
   uint64_t number = 0;  // of the request, as Ask returned it
@@ -46,6 +54,8 @@ struct ScenePicture {
   double prepare_ms = 0.0;  // of a tile set that was not resident in GL: upload, shaders; else 0
   double draw_ms = 0.0;
   double texels_per_pixel = 0.0;  // along a pixel's side
+  MipUse mips = MipUse::kNotNeeded;
+  std::string why_no_mips;  // of kNone
 };
 
 // What stays in GL: at most this many tile sets, of at most this size together.
@@ -64,6 +74,8 @@ class SceneView {
 
   // Returns the request's number, from 1 on.
   uint64_t Ask(SceneRequest request);
+  // A picture that mip levels were missing for comes again by itself, with the same number, once they are
+  // made.
   [[nodiscard]] std::optional<ScenePicture> TakePicture();
   // Nothing waits, is drawn or is to be taken.
   [[nodiscard]] bool IsIdle() const;
@@ -72,17 +84,21 @@ class SceneView {
   struct Prepared {
     std::shared_ptr<const Dressing> dressing;
     std::shared_ptr<const TileSet> tile_set;
+    std::shared_ptr<const TileMips> mips;  // or nullptr
     std::unique_ptr<GlPreview> preview;
   };
   struct Key {
     const Dressing* dressing;
     const TileSet* tile_set;
+    const TileMips* mips;
     bool operator==(const Key&) const = default;
   };
 
   void Run(std::stop_token stop);
   ScenePicture Draw(const SceneRequest& request, const RunContext& context);
-  absl::StatusOr<GlPreview*> Prepare(const SceneRequest& request, double& prepare_ms);
+  absl::StatusOr<GlPreview*> Prepare(const SceneRequest& request, const std::shared_ptr<const TileMips>& mips,
+                                     double& prepare_ms);
+  void DrawAgain();
 
   OffscreenContext& context_;
   const std::function<void()> wake_;
@@ -90,9 +106,11 @@ class SceneView {
   mutable std::mutex mutex_;                                           // guards what follows, up to busy_
   std::condition_variable_any changed_;
   std::optional<SceneRequest> request_;
+  std::optional<SceneRequest> last_request_;  // as it was drawn
   uint64_t num_asked_ = 0;
   std::optional<ScenePicture> picture_;
   bool busy_ = false;
+  MipMaker mip_maker_;   // before thread_, which asks it
   std::jthread thread_;  // last: it uses all of the above
 };
 

@@ -27,10 +27,11 @@ struct StepForm {
   Kind kind;
   int numbers;  // 0: a text
 };
-constexpr StepForm kForms[] = {{"wait", Kind::kWait, 0},     {"select", Kind::kSelect, 0},
-                               {"orbit", Kind::kOrbit, 2},   {"pan", Kind::kPan, 2},
-                               {"zoom", Kind::kZoom, 1},     {"light", Kind::kLight, 2},
-                               {"frames", Kind::kFrames, 1}, {"screenshot", Kind::kScreenshot, 0}};
+constexpr StepForm kForms[] = {{"wait", Kind::kWait, 0},         {"select", Kind::kSelect, 0},
+                               {"orbit", Kind::kOrbit, 2},       {"pan", Kind::kPan, 2},
+                               {"zoom", Kind::kZoom, 1},         {"light", Kind::kLight, 2},
+                               {"exposure", Kind::kExposure, 1}, {"tone", Kind::kTone, 0},
+                               {"frames", Kind::kFrames, 1},     {"screenshot", Kind::kScreenshot, 0}};
 
 absl::Status BadLine(size_t line, std::string_view expected) {
   return absl::InvalidArgumentError(
@@ -51,11 +52,17 @@ absl::StatusOr<ScriptStep> ParseStep(const StepForm& form, const Json& value, si
       return BadLine(line, absl::StrCat("a text after \"", form.key, "\""));
     }
     step.text = value.get<std::string>();
+    if (form.kind == Kind::kTone && !ParseToneCurve(step.text).ok()) {
+      return BadLine(line, "\"none\", \"reinhard\" or \"filmic\" after \"tone\"");
+    }
     return form.kind != Kind::kWait || step.text == "loaded" ? absl::StatusOr<ScriptStep>(step)
                                                              : BadLine(line, "\"loaded\" after \"wait\"");
   }
   if (form.numbers == 1) {
     TESSERA_ASSIGN_OR_RETURN(step.first, FiniteNumber(value, line, form.key));
+    if (form.kind == Kind::kExposure && !CheckTone({.exposure_stops = step.first}).ok()) {
+      return BadLine(line, "-20 to 20 after \"exposure\"");
+    }
     return step;
   }
   if (!value.is_array() || value.size() != 2) {
@@ -101,6 +108,11 @@ absl::Status WaitUntilSettled(App& app) {
   return OneFrame(app);
 }
 
+// Once nothing is on its way, none are coming.
+const char* MipWord(MipUse mips) {
+  return mips == MipUse::kDrawn ? "drawn" : mips == MipUse::kNotNeeded ? "not needed" : "none";
+}
+
 std::string ReportLine(const App& app, const std::string& name) {
   const std::optional<Redressing>& done = app.redressing();
   if (!done.has_value() || done->tile_set != name) {
@@ -113,7 +125,9 @@ std::string ReportLine(const App& app, const std::string& name) {
               {"load_ms", done->load_ms},
               {"prepare_ms", done->prepare_ms},
               {"draw_ms", done->draw_ms},
-              {"total_ms", done->total_ms}}
+              {"total_ms", done->total_ms},
+              {"texels_per_pixel", app.facts().texels_per_pixel},
+              {"mips", MipWord(app.facts().mips)}}
              .dump() +
          "\n";
 }
@@ -140,6 +154,13 @@ absl::Status RunStep(App& app, const ScriptStep& step, std::string& report) {
     case Kind::kLight:
       app.state().light.Set(RadFromDeg(step.first), RadFromDeg(step.second));
       return absl::OkStatus();
+    case Kind::kExposure:
+      app.state().tone.exposure_stops = step.first;
+      return absl::OkStatus();
+    case Kind::kTone: {
+      TESSERA_ASSIGN_OR_RETURN(app.state().tone.curve, ParseToneCurve(step.text));
+      return absl::OkStatus();
+    }
     case Kind::kFrames:
       for (int i = 0; i < std::min<double>(step.first, kMostFrames); ++i) {
         TESSERA_RETURN_IF_ERROR(OneFrame(app));

@@ -18,6 +18,7 @@
 #include <string_view>
 #include <vector>
 
+#include "btf/image/tone_map.h"
 #include "viewer/loader.h"
 #include "viewer/orbit_camera.h"
 #include "viewer/recent.h"
@@ -89,6 +90,7 @@ class ViewerState {
 
   OrbitCamera camera;
   LightAngles light;
+  Tone tone;
 
  private:
   void ApplySurface(LoadEvent event);

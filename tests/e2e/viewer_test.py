@@ -89,6 +89,27 @@ class ViewerTest(harness.CommandTest):
             self.assertEqual(redressed["pictures"], 1, "a resident tile set is in the next picture")
             self.assertEqual((redressed["load_ms"], redressed["prepare_ms"]), (0, 0), result)
 
+    def test_far_away_and_developed(self):
+        """Mip levels are drawn above two texels a pixel; exposure and tone change the mesh alone."""
+        (self.folder / "far-script").write_text("\n".join(json.dumps(step) for step in [
+            {"wait": "loaded"}, {"select": "surface-96/weave"}, {"screenshot": "plain.png"},
+            {"exposure": -3}, {"screenshot": "under.png"}, {"exposure": 0}, {"tone": "filmic"},
+            {"screenshot": "filmic.png"}, {"tone": "none"}, {"screenshot": "plain-again.png"}, {"zoom": -25},
+            {"select": "surface-96/holes"}, {"select": "surface-96/weave"}]))
+        result = self.viewer("--tileset", "surface-96/holes", "--offscreen", "far.png", "--script", "far-script")
+        self.assertEqual(result.code, 0, result)
+        plain, under, filmic, again = (Picture(self.folder / f"{name}.png")
+                                       for name in ("plain", "under", "filmic", "plain-again"))
+        near, *far = [json.loads(line) for line in result.out.splitlines()]
+        self.assertLess(near["texels_per_pixel"], 2, result)
+        self.assertEqual(near["mips"], "not needed", result)
+        for redressed in far:
+            self.assertGreater(redressed["texels_per_pixel"], 2, result)
+            self.assertEqual(redressed["mips"], "drawn", result)
+        for developed in (under, filmic):
+            self.assertGreater(plain.share_different(developed, SCENE), LEAST_SHARE)
+        self.assertEqual(plain.share_different(again, SCENE, by=0), 0)
+
     def test_what_is_wrong_is_told(self):
         nowhere = dict(self.environment(), TESSERA_SERVER="127.0.0.1:1")
         cases = [(["--tileset", "surface-96/weave"], nowhere, "no server at 127.0.0.1:1"),

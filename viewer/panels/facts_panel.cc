@@ -7,9 +7,6 @@
 namespace tessera::viewer {
 namespace {
 
-// Above this many, mip levels would show less noise (btf/render/preview.h).
-constexpr double kManyTexels = 2.0;
-
 std::string MiB(uint64_t bytes) {
   return fmt::format("{:.2f} MiB", static_cast<double>(bytes) / (1 << 20));
 }
@@ -46,6 +43,20 @@ void DrawEntryFacts(const TileSetEntry& entry) {
   }
 }
 
+std::string MipText(const ViewFacts& facts) {
+  switch (facts.mips) {
+    case MipUse::kNotNeeded:
+      return "not needed";
+    case MipUse::kComing:
+      return "being made";
+    case MipUse::kDrawn:
+      return "drawn";
+    case MipUse::kNone:
+      return "none: " + facts.why_no_mips;
+  }
+  return "";
+}
+
 void DrawTimes(const ViewerState& state, const ViewFacts& facts) {
   Fact("picture", fmt::format("{:.1f} ms", facts.draw_ms));
   Fact("interface", fmt::format("{:.1f} ms a frame", facts.frame_ms));
@@ -69,9 +80,8 @@ void DrawFactsPanel(const Rectangle& place, const ViewerState& state, const View
     if (const TileSetEntry* const entry = state.EntryOf(state.shown_name())) {
       DrawEntryFacts(*entry);
     }
-    Fact("texels/pixel", fmt::format("{:.2f}{}", facts.texels_per_pixel,
-                                     facts.texels_per_pixel > kManyTexels ? ": aliased, zoom in" : ""));
-    Fact("mip level", "0, none are used");
+    Fact("texels/pixel", fmt::format("{:.2f}", facts.texels_per_pixel));
+    Fact("mip levels", MipText(facts));
   } else {
     ImGui::TextUnformatted("nothing yet");
   }

@@ -2,6 +2,29 @@
 #include "viewer/panels/panels.h"
 
 namespace tessera::viewer {
+namespace {
+
+constexpr float kMostStops = 8.0F;  // of the slider, up and down
+constexpr float kMostWhite = 64.0F;
+
+void DrawToneControls(Tone& tone) {
+  float stops = static_cast<float>(tone.exposure_stops);
+  if (ImGui::SliderFloat("exposure", &stops, -kMostStops, kMostStops, "%+.1f stops")) {
+    tone.exposure_stops = stops;
+  }
+  // In the order of ToneCurve.
+  int curve = static_cast<int>(tone.curve);
+  if (ImGui::Combo("tone", &curve, "none\0reinhard\0filmic\0")) {
+    tone.curve = static_cast<ToneCurve>(curve);
+  }
+  float white = static_cast<float>(tone.white);
+  if (tone.curve == ToneCurve::kReinhard &&
+      ImGui::SliderFloat("white", &white, 0.5F, kMostWhite, "%.1f", ImGuiSliderFlags_Logarithmic)) {
+    tone.white = white;
+  }
+}
+
+}  // namespace
 
 void DrawLightPanel(const Rectangle& place, ViewerState& state) {
   BeginPanel("Light and camera", place);
@@ -17,6 +40,7 @@ void DrawLightPanel(const Rectangle& place, ViewerState& state) {
   if (ImGui::SliderFloat("strength", &strength, 0.0F, 8.0F, "%.2f")) {
     state.light.strength = strength;
   }
+  DrawToneControls(state.tone);
   ImGui::PopItemWidth();
   if (ImGui::Button("Frame the mesh")) {
     state.ResetCamera();

@@ -9,6 +9,7 @@
 #include <imgui.h>
 
 #include "viewer/gui_renderer.h"
+#include "viewer/scene_view.h"
 #include "viewer/viewer_state.h"
 
 namespace tessera::viewer {
@@ -24,7 +25,9 @@ struct ViewFacts {
   double draw_ms = 0.0;           // of the last picture
   double prepare_ms = 0.0;        // of the last tile set that was not resident
   double texels_per_pixel = 0.0;  // along a pixel's side
-  double redress_ms = 0.0;        // from the last click to the picture; 0 before the first
+  MipUse mips = MipUse::kNotNeeded;
+  std::string why_no_mips;
+  double redress_ms = 0.0;  // from the last click to the picture; 0 before the first
   bool redress_was_cached = false;
   std::string activity;  // what the loader does; empty when nothing
   bool is_drawing = false;
@@ -39,7 +42,7 @@ void DrawTileSetPanel(const Rectangle& place, ViewerState& state,
 ImVec2 DrawScenePanel(const Rectangle& place, ViewerState& state, const GuiTexture* picture);
 // What is shown: codec, bytes, certificate, times.
 void DrawFactsPanel(const Rectangle& place, const ViewerState& state, const ViewFacts& facts);
-// Light by angles, camera.
+// Light by angles, exposure and tone curve, camera.
 void DrawLightPanel(const Rectangle& place, ViewerState& state);
 // Errors and notes, over the picture; nothing when there are none.
 void DrawMessagesPanel(const Rectangle& place, ViewerState& state);
