@@ -2,10 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <utility>
 
 #include <absl/memory/memory.h>
 #include <absl/strings/str_cat.h>
+#include <Eigen/Geometry>
 
 #include "btf/base/atomic_file.h"
 #include "btf/base/status_macros.h"
@@ -16,7 +18,7 @@ namespace {
 
 constexpr float kLeftWidth = 270.0F;
 constexpr float kRightWidth = 300.0F;
-constexpr float kLightHeight = 330.0F;
+constexpr float kLightHeight = 380.0F;
 constexpr size_t kFramesMeasured = 30;
 constexpr char kPictureSubject[] = "picture";
 
@@ -35,6 +37,14 @@ Layout LayOut(ImVec2 display) {
           {ImVec2(kLeftWidth, 0.0F), ImVec2(scene_width, display.y)},
           {ImVec2(right, 0.0F), ImVec2(kRightWidth, facts_height)},
           {ImVec2(right, facts_height), ImVec2(kRightWidth, kLightHeight)}};
+}
+
+std::optional<FrequencyLight> Turned(const Sky& sky) {
+  if (sky.light == nullptr) {
+    return std::nullopt;
+  }
+  const Eigen::AngleAxisd turn(sky.azimuth_rad, Eigen::Vector3d::UnitY());
+  return FrequencyLight(sky.strength * sky.light->InFrame(turn.toRotationMatrix()));
 }
 
 double MsBetween(std::chrono::steady_clock::time_point begin, std::chrono::steady_clock::time_point end) {
@@ -175,6 +185,7 @@ void App::AskForPicture() {
                      .target = camera.target,
                      .light = light.place,
                      .strength = state_->light.strength,
+                     .sky = state_->sky,
                      .tone = state_->tone,
                      .width = static_cast<int>(scene_size_.x),
                      .height = static_cast<int>(scene_size_.y)};
@@ -186,6 +197,7 @@ void App::AskForPicture() {
                .tile_set = state_->shown(),
                .camera = camera,
                .lights = {light},
+               .sky = Turned(state_->sky),
                .tone = state_->tone,
                .width = wanted.width,
                .height = wanted.height});

@@ -69,6 +69,7 @@ class App {
     Eigen::Vector3d target{0, 0, 0};
     Eigen::Vector3d light{0, 0, 0};
     double strength = 0.0;
+    Sky sky;
     Tone tone;
     int width = 0;
     int height = 0;

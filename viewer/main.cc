@@ -3,6 +3,7 @@
 #include <cstdlib>
 #include <memory>
 #include <string>
+#include <utility>
 
 #include <imgui.h>
 #include <CLI/CLI.hpp>
@@ -10,6 +11,8 @@
 #include "btf/base/atomic_file.h"
 #include "btf/base/cpu_features.h"
 #include "btf/base/status_macros.h"
+#include "btf/light/environment.h"
+#include "btf/light/frequency_light.h"
 #include "client/lib/client.h"
 #include "viewer/app.h"
 #include "viewer/script.h"
@@ -22,6 +25,7 @@ struct Flags {
   std::string size = "1280x800";
   std::string offscreen;  // the picture to write
   std::string script;
+  std::string environment;
   int frames = 1;
 };
 
@@ -63,9 +67,21 @@ void PrintMessages(const ViewerState& state) {
   }
 }
 
+absl::StatusOr<std::shared_ptr<const FrequencyLight>> SkyOf(const Flags& flags) {
+  constexpr int kSkyHarmonics = 25;
+  if (flags.environment.empty()) {
+    return nullptr;
+  }
+  TESSERA_ASSIGN_OR_RETURN(const Environment environment, ReadEnvironment(flags.environment, {}));
+  TESSERA_ASSIGN_OR_RETURN(FrequencyLight light, FrequencyLight::Create(environment, kSkyHarmonics));
+  return std::make_shared<const FrequencyLight>(std::move(light));
+}
+
 absl::Status RunOn(Display& display, const Flags& flags, const std::vector<ScriptStep>& steps) {
+  ViewerOptions options = flags.viewer;
+  TESSERA_ASSIGN_OR_RETURN(options.sky, SkyOf(flags));
   TESSERA_ASSIGN_OR_RETURN(const std::unique_ptr<App> app,
-                           App::Create(display, MakeServerSource(flags.viewer.server), flags.viewer));
+                           App::Create(display, MakeServerSource(options.server), options));
   if (!steps.empty()) {
     std::string report;
     const absl::Status status = RunScript(*app, steps, report);
@@ -111,6 +127,10 @@ void AddOptions(CLI::App& parser, Flags& flags) {
   parser.add_option("--arrangement", choice.arrangement,
                     "Of that mesh [the tile set's, else surface-96]: plane-16, surface-96..");
   parser.add_option("--tileset", flags.viewer.tile_set, "ARRANGEMENT/NAME to begin with [the first]");
+  parser.add_option(
+      "--env", flags.environment,
+      "Light from all around: a Radiance or OpenEXR picture, equirectangular or an angular map, in "
+      "25 spherical harmonics");
   parser.add_option("--size", flags.size, "WIDTHxHEIGHT in pixels")->capture_default_str();
   parser.add_option("--offscreen", flags.offscreen,
                     "Write the window to this PNG file, without a screen, and end");

@@ -111,6 +111,7 @@ ScenePicture SceneView::Draw(const SceneRequest& request, const RunContext& cont
   scene.tile_set = request.tile_set.get();
   scene.camera = request.camera;
   scene.lights = request.lights;
+  scene.frequency_light = request.sky.has_value() ? &*request.sky : nullptr;
   scene.width = request.width;
   scene.height = request.height;
   picture.texels_per_pixel = TexelsPerPixel(scene);

@@ -24,6 +24,7 @@
 #include <absl/status/status.h>
 
 #include "btf/image/tone_map.h"
+#include "btf/light/frequency_light.h"
 #include "btf/render/offscreen_context.h"
 #include "btf/render/preview.h"
 #include "viewer/mip_maker.h"
@@ -37,6 +38,7 @@ struct SceneRequest {
   std::shared_ptr<const TileSet> tile_set;
   Camera camera;
   std::vector<Light> lights;
+  std::optional<FrequencyLight> sky;
   Tone tone;
   int width = 0;
   int height = 0;

@@ -27,11 +27,17 @@ struct StepForm {
   Kind kind;
   int numbers;  // 0: a text
 };
-constexpr StepForm kForms[] = {{"wait", Kind::kWait, 0},         {"select", Kind::kSelect, 0},
-                               {"orbit", Kind::kOrbit, 2},       {"pan", Kind::kPan, 2},
-                               {"zoom", Kind::kZoom, 1},         {"light", Kind::kLight, 2},
-                               {"exposure", Kind::kExposure, 1}, {"tone", Kind::kTone, 0},
-                               {"frames", Kind::kFrames, 1},     {"screenshot", Kind::kScreenshot, 0}};
+constexpr StepForm kForms[] = {{"wait", Kind::kWait, 0},
+                               {"select", Kind::kSelect, 0},
+                               {"orbit", Kind::kOrbit, 2},
+                               {"pan", Kind::kPan, 2},
+                               {"zoom", Kind::kZoom, 1},
+                               {"light", Kind::kLight, 2},
+                               {"sky", Kind::kSky, 2},
+                               {"exposure", Kind::kExposure, 1},
+                               {"tone", Kind::kTone, 0},
+                               {"frames", Kind::kFrames, 1},
+                               {"screenshot", Kind::kScreenshot, 0}};
 
 absl::Status BadLine(size_t line, std::string_view expected) {
   return absl::InvalidArgumentError(
@@ -70,6 +76,9 @@ absl::StatusOr<ScriptStep> ParseStep(const StepForm& form, const Json& value, si
   }
   TESSERA_ASSIGN_OR_RETURN(step.first, FiniteNumber(value[0], line, form.key));
   TESSERA_ASSIGN_OR_RETURN(step.second, FiniteNumber(value[1], line, form.key));
+  if (form.kind == Kind::kSky && step.second < 0.0) {
+    return BadLine(line, "a strength of at least 0 after \"sky\"");
+  }
   return step;
 }
 
@@ -153,6 +162,10 @@ absl::Status RunStep(App& app, const ScriptStep& step, std::string& report) {
       return absl::OkStatus();
     case Kind::kLight:
       app.state().light.Set(RadFromDeg(step.first), RadFromDeg(step.second));
+      return absl::OkStatus();
+    case Kind::kSky:
+      app.state().sky.azimuth_rad = RadFromDeg(step.first);
+      app.state().sky.strength = step.second;
       return absl::OkStatus();
     case Kind::kExposure:
       app.state().tone.exposure_stops = step.first;

@@ -5,6 +5,7 @@
 //   {"orbit": [30, -10]}  {"pan": [5, 0]}   by pixels of a mouse
 //   {"zoom": 3}                             by steps of its wheel
 //   {"light": [120, 40]}                    azimuth, elevation, degrees
+//   {"sky": [90, 1.5]}                      the environment's turn, degrees, and its strength
 //   {"exposure": -1.5}                      stops, -20 to 20
 //   {"tone": "filmic"}                      none, reinhard, filmic
 //   {"frames": 10}                          so many frames of the interface
@@ -23,7 +24,19 @@
 namespace tessera::viewer {
 
 struct ScriptStep {
-  enum class Kind { kWait, kSelect, kOrbit, kPan, kZoom, kLight, kExposure, kTone, kFrames, kScreenshot };
+  enum class Kind {
+    kWait,
+    kSelect,
+    kOrbit,
+    kPan,
+    kZoom,
+    kLight,
+    kSky,
+    kExposure,
+    kTone,
+    kFrames,
+    kScreenshot
+  };
   Kind kind = Kind::kWait;
   std::string text;    // of kSelect, kTone and kScreenshot
   double first = 0.0;  // numbers, in order

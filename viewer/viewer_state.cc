@@ -26,7 +26,11 @@ uint64_t SizeInMemory(const TileSet& tile_set) {
 }
 
 ViewerState::ViewerState(Loader& loader, ViewerOptions options)
-    : loader_(loader), options_(std::move(options)), selected_(options_.tile_set) {}
+    : sky{.light = options.sky}, loader_(loader), options_(std::move(options)), selected_(options_.tile_set) {
+  if (sky.light != nullptr) {
+    light.strength = 0.0;
+  }
+}
 
 void ViewerState::Begin() {
   loader_.Open(options_.choice);

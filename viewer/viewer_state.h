@@ -19,16 +19,26 @@
 #include <vector>
 
 #include "btf/image/tone_map.h"
+#include "btf/light/frequency_light.h"
 #include "viewer/loader.h"
 #include "viewer/orbit_camera.h"
 #include "viewer/recent.h"
 
 namespace tessera::viewer {
 
+// Light from all around, in the frequency domain; none without `light`.
+struct Sky {
+  std::shared_ptr<const FrequencyLight> light;
+  double azimuth_rad = 0.0;  // turned by, about the vertical, counter-clockwise seen from above
+  double strength = 1.0;
+  bool operator==(const Sky&) const = default;
+};
+
 struct ViewerOptions {
   std::string server;
   SurfaceChoice choice;
-  std::string tile_set;  // to begin with; empty: the first of the list
+  std::string tile_set;                       // to begin with; empty: the first of the list
+  std::shared_ptr<const FrequencyLight> sky;  // or none; the other light is then out to begin with
 };
 
 // Something that went wrong, or that is worth knowing, until it is put away.
@@ -90,6 +100,7 @@ class ViewerState {
 
   OrbitCamera camera;
   LightAngles light;
+  Sky sky;
   Tone tone;
 
  private:

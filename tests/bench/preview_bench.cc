@@ -1,6 +1,7 @@
 // A fully covered 640x480 frame of every codec: what a further picture of a prepared preview costs, with one
 // texel a pixel and bilinear, against its limit; making it ready, and the first picture with its shaders,
-// once. Beside the median of the wall clock stands the least processor time by the number of cores, which
+// once; the same under light from all around, in the frequency domain and, of "dsh" 25x25, as 50 lights with
+// shadows. Beside the median of the wall clock stands the least processor time by the number of cores, which
 // others on the machine hardly change. Prints `name,value,unit,limit,verdict`; exits 1 when a limit is
 // missed.
 #include <sys/resource.h>
@@ -18,6 +19,8 @@
 #include <absl/strings/str_cat.h>
 
 #include "btf/codec/codec.h"
+#include "btf/light/generated_environment.h"
+#include "btf/light/q2_tree.h"
 #include "btf/render/offscreen_context.h"
 #include "btf/render/preview.h"
 #include "btf/render/reference.h"
@@ -37,6 +40,9 @@ constexpr int kTilesAcross = 32;
 constexpr int kTileSize = 64;
 constexpr int kBtfels = 12000;  // as many as `surface-96` keeps of a 128 x 128 material
 constexpr double kTexelsPerPixel = 0.7;
+constexpr int kEnvironmentLights = 50;
+constexpr double kLitNearest = 8.0;  // seconds
+constexpr double kLitBilinear = 20.0;
 
 double SecondsSince(Clock::time_point start) {
   return std::chrono::duration<double>(Clock::now() - start).count();
@@ -200,6 +206,20 @@ int Run() {
 
   // Hardly any decoding: what all codecs' pictures cost beside it.
   ok &= TimeCodec(**context, "dsh_1x1", testing::RandomBtfels(kBtfels, 1, 1, 3), 0.0, 0.0, 0.0);
+
+  // An environment as lights with shadows: the bound is as many pictures under one light.
+  Frame lit(dsh(), kTexelsPerPixel);
+  lit.scene.shadows = ShadowParams{};
+  lit.scene.lights = DirectionalLights(*Q2Tree(*GeneratedEnvironment("studio")).Lights(kEnvironmentLights));
+  const std::unique_ptr<GlPreview> lit_preview = Prepare(**context, lit);
+  for (const Filter filter : {Filter::kNearest, Filter::kBilinear}) {
+    lit.scene.filter = filter;
+    const auto start = Clock::now();
+    (void)lit_preview->Render(lit.scene, {});
+    ok &= Print(filter == Filter::kNearest ? "dsh_25x25_50_lights_shadows_nearest"
+                                           : "dsh_25x25_50_lights_shadows_bilinear",
+                SecondsSince(start), "s", filter == Filter::kNearest ? kLitNearest : kLitBilinear);
+  }
 
   const Frame minified(dsh(), 2.5);
   PrintCost("dsh_25x25_minified", TimePicture(*Prepare(**context, minified), minified.scene), 0.0);

@@ -110,6 +110,23 @@ class ViewerTest(harness.CommandTest):
             self.assertGreater(plain.share_different(developed, SCENE), LEAST_SHARE)
         self.assertEqual(plain.share_different(again, SCENE, by=0), 0)
 
+    def test_light_from_all_around(self):
+        """An environment lights the mesh alone, and turns."""
+        (self.folder / "sky.hdr").write_bytes(
+            b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 4 +X 8\n" +
+            b"".join(bytes((128, 96, 64, 130 if i % 8 < 4 else 126)) for i in range(32)))
+        (self.folder / "sky-script").write_text("\n".join(json.dumps(step) for step in [
+            {"wait": "loaded"}, {"screenshot": "sky.png"}, {"sky": [180, 1]}, {"screenshot": "turned.png"},
+            {"sky": [0, 0]}, {"screenshot": "dark.png"}, {"sky": [0, 1]}, {"screenshot": "sky-again.png"}]))
+        result = self.viewer("--tileset", "surface-96/weave", "--env", "sky.hdr", "--offscreen", "end.png", "--script",
+                             "sky-script")
+        self.assertEqual(result.code, 0, result)
+        sky, turned, dark, again = (Picture(self.folder / f"{name}.png")
+                                    for name in ("sky", "turned", "dark", "sky-again"))
+        for other in (turned, dark):
+            self.assertGreater(sky.share_different(other, SCENE), LEAST_SHARE)
+        self.assertEqual(sky.share_different(again, SCENE, by=0), 0)
+
     def test_what_is_wrong_is_told(self):
         nowhere = dict(self.environment(), TESSERA_SERVER="127.0.0.1:1")
         cases = [(["--tileset", "surface-96/weave"], nowhere, "no server at 127.0.0.1:1"),

@@ -14,16 +14,17 @@ TEST(ScriptTest, ReadsEveryStep) {
   const auto steps = ParseScript(
       "{\"wait\": \"loaded\"}\n\n{\"select\": \"surface-96/wool\"}\n{\"orbit\": [3, -4.5]}\r\n"
       "{\"pan\": [1, 2]}\n{\"zoom\": 3}\n{\"light\": [120, 40]}\n{\"frames\": 2}\n"
-      "{\"exposure\": -1.5}\n{\"tone\": \"filmic\"}\n"
+      "{\"exposure\": -1.5}\n{\"tone\": \"filmic\"}\n{\"sky\": [90, 1.5]}\n"
       "{\"screenshot\": \"f.png\"}");
   ASSERT_TRUE(steps.ok()) << steps.status();
-  ASSERT_EQ(steps->size(), 10u);
+  ASSERT_EQ(steps->size(), 11u);
   EXPECT_EQ((*steps)[1].text, "surface-96/wool");
   EXPECT_EQ((*steps)[2].kind, ScriptStep::Kind::kOrbit);
   EXPECT_EQ((*steps)[2].second, -4.5);
   EXPECT_EQ((*steps)[7].first, -1.5);
   EXPECT_EQ((*steps)[8].text, "filmic");
-  EXPECT_EQ((*steps)[9].text, "f.png");
+  EXPECT_EQ((*steps)[9].second, 1.5);
+  EXPECT_EQ((*steps)[10].text, "f.png");
 }
 
 TEST(ScriptTest, NamesTheLineThatIsWrong) {
@@ -34,6 +35,7 @@ TEST(ScriptTest, NamesTheLineThatIsWrong) {
       {"{\"orbit\": [1, \"2\"]}", "line 1: expected numbers after \"orbit\""},
       {"{\"zoom\": \"in\"}", "line 1: expected numbers after \"zoom\""},
       {"{\"select\": 5}", "line 1: expected a text after \"select\""},
+      {"{\"sky\": [0, -1]}", "line 1: expected a strength of at least 0 after \"sky\""},
       {"{\"exposure\": 21}", "line 1: expected -20 to 20 after \"exposure\""},
       {"{\"tone\": \"loud\"}", "line 1: expected \"none\", \"reinhard\" or \"filmic\" after \"tone\""},
       {"{\"wait\": \"tea\"}", "line 1: expected \"loaded\" after \"wait\""},

@@ -24,6 +24,17 @@ void DrawToneControls(Tone& tone) {
   }
 }
 
+void DrawSkyControls(Sky& sky) {
+  float azimuth_deg = static_cast<float>(DegFromRad(sky.azimuth_rad));
+  if (ImGui::SliderFloat("sky turn", &azimuth_deg, 0.0F, 360.0F, "%.0f deg")) {
+    sky.azimuth_rad = RadFromDeg(azimuth_deg);
+  }
+  float strength = static_cast<float>(sky.strength);
+  if (ImGui::SliderFloat("sky", &strength, 0.0F, 8.0F, "%.2f")) {
+    sky.strength = strength;
+  }
+}
+
 }  // namespace
 
 void DrawLightPanel(const Rectangle& place, ViewerState& state) {
@@ -39,6 +50,9 @@ void DrawLightPanel(const Rectangle& place, ViewerState& state) {
   float strength = static_cast<float>(state.light.strength);
   if (ImGui::SliderFloat("strength", &strength, 0.0F, 8.0F, "%.2f")) {
     state.light.strength = strength;
+  }
+  if (state.sky.light != nullptr) {
+    DrawSkyControls(state.sky);
   }
   DrawToneControls(state.tone);
   ImGui::PopItemWidth();
