@@ -78,12 +78,12 @@ TEST_P(EnvironmentLightTest, TheFrequencyDomainIsTheSumOverTexels) {
   for (const View& view : {View{"cube-sphere", 5, 0}, View{"torus", 140, 5}}) {
     SCOPED_TRACE(std::string(view.shape));
     const Dressing dressing = RandomDressing(*BuiltinShape(view.shape), 1);
-    PreviewScene scene{.dressing = &dressing, .tile_set = &tile_set, .width = 10, .height = 10};
+    PreviewScene scene{.dressing = &dressing, .tile_set = &tile_set, .width = 16, .height = 16};
     scene.lights.clear();
     scene.camera = *OrbitCamera(dressing.mesh,
                                 {.azimuth_rad = RadFromDeg(view.azimuth_deg),
                                  .elevation_rad = RadFromDeg(view.elevation_deg),
-                                 .distance = 1.0},
+                                 .distance = 1.7},
                                 scene.width, scene.height);
     const Image texels = Reference(scene, {.environment = &sky, .negative_values = NegativeValues::kKeep});
     scene.frequency_light = &*light;

@@ -14,7 +14,7 @@ TEST(CompletionTest, ListsCommandsAndOptionsOfEveryLevel) {
   AddTileSetCommands(app, session);
   const std::string script = BashCompletion(app);
   EXPECT_NE(script.find("'') words='tileset "), std::string::npos) << script;
-  EXPECT_NE(script.find("'tileset') words='synthesize list show pull certify sheet mips delete "),
+  EXPECT_NE(script.find("'tileset') words='synthesize list show pull certify sheet thumbnail mips delete "),
             std::string::npos);
   const size_t synthesize = script.find("'tileset synthesize') words='");
   ASSERT_NE(synthesize, std::string::npos);
