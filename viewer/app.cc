@@ -4,6 +4,7 @@
 #include <cmath>
 #include <optional>
 #include <utility>
+#include <vector>
 
 #include <absl/memory/memory.h>
 #include <absl/strings/str_cat.h>
@@ -196,7 +197,7 @@ void App::AskForPicture() {
   scene_->Ask({.dressing = state_->dressing(),
                .tile_set = state_->shown(),
                .camera = camera,
-               .lights = {light},
+               .lights = state_->light.strength > 0.0 ? std::vector<Light>{light} : std::vector<Light>{},
                .sky = Turned(state_->sky),
                .tone = state_->tone,
                .width = wanted.width,
