@@ -14,6 +14,7 @@
 #include "btf/base/status_macros.h"
 #include "btf/chart/codec_chart.h"
 #include "btf/chart/page_parts.h"
+#include "btf/chart/page_style.h"
 #include "btf/report/page.h"
 #include "btf/report/pareto.h"
 #include "btf/report/svg_plot.h"
@@ -23,14 +24,6 @@ namespace {
 
 constexpr char kTitle[] = "Codecs: bytes, speed, error";
 constexpr char kStyle[] = R"(
-h1 { font-size: 2em; margin-bottom: .2em; }
-h2 { font-size: 1.5em; margin-top: 2.2em; border-bottom: 2px solid #1f2328; padding-bottom: .2em; }
-h3 { font-size: 1.1em; margin: 1.8em 0 .4em; }
-p.lead, p.facts { color: #57606a; max-width: 62em; }
-ul.findings li { margin: .25em 0; max-width: 72em; }
-.legend { display: flex; flex-wrap: wrap; gap: .2em 1.4em; margin: .6em 0; align-items: center; }
-.legend span { display: inline-flex; align-items: center; gap: .4em; }
-.plots { display: flex; flex-wrap: wrap; gap: 6px; }
 .tabs > input { position: absolute; opacity: 0; }
 .tabs > label { display: inline-block; padding: .25em 1em; border: 1px solid #d0d7de; border-radius: 1em; margin-right: .4em; cursor: pointer; }
 .tabs > input:checked + label { background: #1f2328; color: #fff; border-color: #1f2328; }
@@ -43,9 +36,6 @@ ul.findings li { margin: .25em 0; max-width: 72em; }
 .crops figcaption b { display: block; }
 .crops .blank { width: 150px; height: 150px; display: flex; align-items: center; justify-content: center; color: #57606a; border: 1px dashed #d0d7de; box-sizing: border-box; margin-bottom: 2px; text-align: center; }
 p.pair { margin: 1em 0 .2em; font-weight: 600; }
-details { margin: 1em 0; }
-summary { cursor: pointer; font-weight: 600; }
-.wide { overflow-x: auto; }
 table.front td { min-width: 15em; }
 table.front b, table td.method { white-space: nowrap; }
 i.swatch { display: inline-block; width: .75em; height: .75em; border-radius: 50%; margin-right: .45em; }
@@ -344,7 +334,7 @@ absl::StatusOr<std::string> CodecsHtml(const std::vector<SourceChart>& charts,
     body += PaperHtml(paper);
   }
   body += MethodHtml(charts);
-  return HtmlPage(kTitle, kStyle, body);
+  return HtmlPage(kTitle, absl::StrCat(kChartStyle, kStyle), body);
 }
 
 }  // namespace tessera

@@ -9,6 +9,7 @@
 
 #include "btf/base/status_macros.h"
 #include "btf/chart/lighting_chart.h"
+#include "btf/chart/page_style.h"
 #include "btf/report/page.h"
 #include "btf/report/svg_plot.h"
 
@@ -17,13 +18,6 @@ namespace {
 
 constexpr char kLightingTitle[] = "Light from all around: error against time";
 constexpr char kLightingStyle[] = R"(
-h1 { font-size: 2em; margin-bottom: .2em; }
-h2 { font-size: 1.5em; margin-top: 2.2em; border-bottom: 2px solid #1f2328; padding-bottom: .2em; }
-p.lead, p.facts { color: #57606a; max-width: 62em; }
-ul li { margin: .25em 0; max-width: 72em; }
-.legend { display: flex; flex-wrap: wrap; gap: .2em 1.4em; margin: .6em 0; align-items: center; }
-.legend span { display: inline-flex; align-items: center; gap: .4em; }
-.plots { display: flex; flex-wrap: wrap; gap: 4px; }
 .pictures { display: flex; flex-wrap: wrap; gap: 12px; }
 .pictures figure { margin: 0; width: 288px; }
 .pictures img { width: 288px; image-rendering: pixelated; display: block; }
@@ -193,7 +187,8 @@ absl::StatusOr<std::string> LightingHtml(const std::vector<LightingChart>& chart
           "</div>\n", pictures);
     }
   }
-  return HtmlPage(kLightingTitle, kLightingStyle, absl::StrCat(body, kLightingRules));
+  return HtmlPage(kLightingTitle, absl::StrCat(kChartStyle, kLightingStyle),
+                  absl::StrCat(body, kLightingRules));
 }
 
 }  // namespace tessera

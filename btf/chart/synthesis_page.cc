@@ -10,6 +10,7 @@
 #include <absl/strings/str_format.h>
 
 #include "btf/base/status_macros.h"
+#include "btf/chart/page_style.h"
 #include "btf/chart/synthesis_chart.h"
 #include "btf/report/page.h"
 #include "btf/report/svg_plot.h"
@@ -19,20 +20,9 @@ namespace {
 
 constexpr char kSynthesisTitle[] = "Tile synthesis: seams, speed, repetition";
 constexpr char kSynthesisStyle[] = R"(
-h1 { font-size: 2em; margin-bottom: .2em; }
-h2 { font-size: 1.5em; margin-top: 2.2em; border-bottom: 2px solid #1f2328; padding-bottom: .2em; }
-h3 { font-size: 1.1em; margin: 1.8em 0 .4em; }
-p.lead, p.facts { color: #57606a; max-width: 62em; }
-ul li { margin: .25em 0; max-width: 72em; }
-.legend { display: flex; flex-wrap: wrap; gap: .2em 1.4em; margin: .6em 0; align-items: center; }
-.legend span { display: inline-flex; align-items: center; gap: .4em; }
-.plots { display: flex; flex-wrap: wrap; gap: 4px; }
 .sheets { display: flex; flex-wrap: wrap; gap: 12px; }
 .sheets figure { margin: 0; width: 600px; }
 .sheets img { width: 600px; image-rendering: pixelated; display: block; }
-details { margin: 1em 0; }
-summary { cursor: pointer; font-weight: 600; }
-.wide { overflow-x: auto; }
 )";
 
 struct MethodLook {
@@ -344,7 +334,8 @@ absl::StatusOr<std::string> SynthesisHtml(const std::vector<SynthesisChart>& cha
   if (!paper.empty()) {
     body += TilesHtml(paper);
   }
-  return HtmlPage(kSynthesisTitle, kSynthesisStyle, absl::StrCat(body, kSynthesisRules));
+  return HtmlPage(kSynthesisTitle, absl::StrCat(kChartStyle, kSynthesisStyle),
+                  absl::StrCat(body, kSynthesisRules));
 }
 
 }  // namespace tessera

@@ -12,8 +12,8 @@ namespace tessera {
 //
 // The frame's axis n is turned from the pole in two steps, by the azimuth and, about y, by the polar angle;
 // what then is left is a turn about n. About z harmonics turn in pairs, and a turn about y is one about z
-// between two by a quarter about x, whose matrices are constants, mostly zeros: fewer multiplications than
-// the recursion of light/sh_rotation.h takes, from which the constants come. At the pole any azimuth does, as
+// between two by a quarter about x, whose matrices are constants, mostly zeros, by
+// light/sh_rotation.h. At the pole any azimuth does, as
 // the last turn follows from the other two.
 [[nodiscard]] std::string HarmonicsAtGlsl(int n);
 

@@ -82,6 +82,15 @@ absl::Status CheckMips(const TileSet& tile_set, const TileMips& mips) {
   return absl::OkStatus();
 }
 
+Eigen::Vector3d LocalView(const SurfaceFrame& frame, const Eigen::Vector3d& to_eye) {
+  Eigen::Vector3d view = frame.LocalFromWorld(to_eye);
+  if (view.z() < kLeastViewCosine) {
+    view.z() = kLeastViewCosine;
+    view.normalize();
+  }
+  return view;
+}
+
 }  // namespace
 
 absl::StatusOr<DressedSurface> DressedSurface::Create(const Dressing& dressing, const TileSet& tile_set,
@@ -323,15 +332,6 @@ Eigen::Array3d BlendedTaps::ValueOf(const std::function<LinearForm(int turns)>& 
     }
   }
   return sum;
-}
-
-Eigen::Vector3d LocalView(const SurfaceFrame& frame, const Eigen::Vector3d& to_eye) {
-  Eigen::Vector3d view = frame.LocalFromWorld(to_eye);
-  if (view.z() < kLeastViewCosine) {
-    view.z() = kLeastViewCosine;
-    view.normalize();
-  }
-  return view;
 }
 
 Eigen::Array3d ReflectanceOfTaps(const BlendedTaps& taps, const Decoder& decoder, const SurfaceFrame& frame,

@@ -141,15 +141,14 @@ class BlendedTaps {
   std::array<std::vector<double>, 4> coefficients_;  // empty where no tap has these turns
 };
 
-// A view below the horizon is lifted to kLeastViewCosine.
-[[nodiscard]] Eigen::Vector3d LocalView(const SurfaceFrame& frame, const Eigen::Vector3d& to_eye);
-
-// Reflectance, before the clamp at 0, of the taps in `frame` under unit world directions.
+// Reflectance, before the clamp at 0, of the taps in `frame` under unit world directions; a view
+// below the horizon is lifted to kLeastViewCosine.
 [[nodiscard]] Eigen::Array3d ReflectanceOfTaps(const BlendedTaps& taps, const Decoder& decoder,
                                                const SurfaceFrame& frame, const Eigen::Vector3d& to_light,
                                                const Eigen::Vector3d& to_eye);
 
-// Radiance, before the clamp at 0, of the taps under light from all around, as RadianceForm has it.
+// Radiance, before the clamp at 0, of the taps under light from all around, as RadianceForm has it; the
+// view as above.
 [[nodiscard]] Eigen::Array3d RadianceOfTaps(const BlendedTaps& taps, const Decoder& decoder,
                                             const SurfaceFrame& frame, const FrequencyLight& light,
                                             const Eigen::Vector3d& to_eye);

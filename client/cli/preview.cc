@@ -222,17 +222,16 @@ void AddLightOptions(CLI::App& command, PreviewFlags& flags) {
       "--env", flags.environment,
       "Light from all around: a Radiance or OpenEXR picture, equirectangular (2:1) or an angular "
       "map (1:1); beside --light, and in place of the usual one");
-  constexpr int kMostEnvironmentLights = 1000;
   command
       .add_option("--env-lights", flags.environment_lights,
-                  "As that many lights by importance, which --shadows shadows [50 with --shadows]")
-      ->check(CLI::Range(1, kMostEnvironmentLights));
-  constexpr int kMostEnvironmentOrder = 7;
+                  "As that many lights by importance, 1 to 1000, which --shadows shadows [50 with --shadows]")
+      ->check(CLI::PositiveNumber);
   command
       .add_option("--env-order", flags.environment_order,
-                  "In the frequency domain, as ORDER squared spherical harmonics, which nothing shadows [5 "
+                  "In the frequency domain, as ORDER squared spherical harmonics, ORDER 1 to 7, which "
+                  "nothing shadows [5 "
                   "without --shadows]")
-      ->check(CLI::Range(1, kMostEnvironmentOrder));
+      ->check(CLI::PositiveNumber);
   command.add_option("--env-rotation", flags.environment_rotation_deg,
                      "Degrees about the vertical, counter-clockwise seen from above [0]");
   command.add_option("--env-scale", flags.environment_scale, "Of its radiance [1]")

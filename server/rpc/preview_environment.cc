@@ -1,6 +1,5 @@
 #include "server/rpc/preview_environment.h"
 
-#include <cmath>
 #include <span>
 #include <string>
 #include <utility>
@@ -59,9 +58,6 @@ absl::StatusOr<PreviewEnvironment> EnvironmentOf(const Backend& backend,
   }
   const v1::EnvironmentLight& message = request.environment();
   TESSERA_RETURN_IF_ERROR(CheckMethod(request));
-  if (!std::isfinite(message.rotation_deg())) {
-    return RefuseEnvironment("the environment's rotation is not finite");
-  }
   TESSERA_RETURN_IF_ERROR(CheckDigest(message.sha256(), "environment"));
   TESSERA_ASSIGN_OR_RETURN(const std::string bytes,
                            backend.blobs.ReadAll(message.sha256(), kMaxEnvironmentBytes));

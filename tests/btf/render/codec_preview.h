@@ -1,17 +1,27 @@
 // The picture of a codec's shader against the CPU reference, for the tests of each codec's GLSL.
 #pragma once
 
+#include <string_view>
 #include <utility>
 
 #include <gtest/gtest.h>
 
 #include "btf/base/rng.h"
+#include "btf/codec/codec.h"
 #include "btf/light/frequency_light.h"
 #include "btf/render/preview.h"
 #include "btf/render/reference.h"
+#include "tests/btf/codec/synthetic_btf.h"
 #include "tests/btf/render/hand_made.h"
 
 namespace tessera::testing {
+
+// A few texels of a shiny material, turned at random in tiles.
+inline TileSet EncodedTiles(std::string_view codec) {
+  SampledBtf btf = ShinyBtf(8, 6, RingDirections(4, 9), RingDirections(4, 12, 60.0));
+  const EncodeParams params{.kl = 9, .kv = 9, .eigen_textures = 3, .rank = 12};
+  return RandomTileSet(FindCodec(codec)->Encode(btf, params, {})->btfels, 16, 3);
+}
 
 // Brighter than dark in every direction.
 inline FrequencyLight RandomFrequencyLight(int n, uint64_t seed) {

@@ -14,7 +14,6 @@
 #include "btf/render/preview.h"
 #include "btf/render/reference.h"
 #include "btf/wang/shapes.h"
-#include "tests/btf/codec/synthetic_btf.h"
 #include "tests/btf/render/codec_preview.h"
 #include "tests/btf/render/hand_made.h"
 
@@ -24,19 +23,12 @@ namespace {
 using testing::CompareAwayFromSilhouettes;
 using testing::Comparison;
 using testing::RandomDressing;
-using testing::RandomTileSet;
 
 constexpr double kRmseOfEveryCodec = 0.5 / 255.0;
 constexpr double kMostDifferingOfEveryCodec = 0.01;
 
 class CodecShapesTest : public ::testing::TestWithParam<std::string_view> {
  protected:
-  static TileSet Encoded(std::string_view codec) {
-    SampledBtf btf = ShinyBtf(8, 6, RingDirections(4, 9), RingDirections(4, 12, 60.0));
-    const EncodeParams params{.kl = 9, .kv = 9, .eigen_textures = 3, .rank = 12};
-    return RandomTileSet(FindCodec(codec)->Encode(btf, params, {})->btfels, 16, 3);
-  }
-
   void ExpectAgreement(OffscreenContext& context, const PreviewScene& scene) {
     const auto image = RenderGl(context, scene, {});
     ASSERT_TRUE(image.ok()) << image.status();
@@ -57,7 +49,7 @@ class CodecShapesTest : public ::testing::TestWithParam<std::string_view> {
 TEST_P(CodecShapesTest, GlMatchesTheReference) {
   const auto context = CreateOsmesaContext();
   ASSERT_TRUE(context.ok()) << context.status();
-  const TileSet tile_set = Encoded(GetParam());
+  const TileSet tile_set = testing::EncodedTiles(GetParam());
   const auto mips = MakeTileMips(tile_set, {}, {});
   ASSERT_TRUE(mips.ok()) << mips.status();
   for (const std::string_view shape : BuiltinShapeNames()) {

@@ -7,14 +7,13 @@
 
 #include <gtest/gtest.h>
 
-#include "btf/codec/codec.h"
 #include "btf/light/q2_tree.h"
 #include "btf/math/spherical_harmonics.h"
 #include "btf/render/offscreen_context.h"
 #include "btf/render/reference.h"
 #include "btf/wang/shapes.h"
-#include "tests/btf/codec/synthetic_btf.h"
 #include "tests/btf/light/environments.h"
+#include "tests/btf/render/codec_preview.h"
 #include "tests/btf/render/hand_made.h"
 
 namespace tessera {
@@ -22,14 +21,8 @@ namespace {
 
 using testing::CompareAwayFromSilhouettes;
 using testing::Comparison;
+using testing::EncodedTiles;
 using testing::RandomDressing;
-using testing::RandomTileSet;
-
-TileSet EncodedTiles(std::string_view codec) {
-  SampledBtf btf = ShinyBtf(8, 6, RingDirections(4, 9), RingDirections(4, 12, 60.0));
-  const EncodeParams params{.kl = 9, .kv = 9, .eigen_textures = 3, .rank = 12};
-  return RandomTileSet(FindCodec(codec)->Encode(btf, params, {})->btfels, 16, 3);
-}
 
 // A sum of harmonics of degrees 0 to 2, bright everywhere.
 Eigen::Array3d SmoothSky(const Eigen::Vector3d& d) {
