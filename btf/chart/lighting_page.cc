@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <string>
 #include <vector>
 
@@ -107,10 +108,15 @@ std::string LightingFindings(const LightingChart& chart, const LightingEnvironme
     if (lights == nullptr) {
       html += "no number of lights charted comes closer.</li>\n";
     } else {
+      // The least number charted says nothing of what fewer would do.
+      const bool is_least = lights == FirstBelow(environment, LightingMethod::kLights, &LightingPoint::error,
+                                                 std::numeric_limits<double>::infinity());
       absl::StrAppendFormat(&html,
                             "%d lights come closer (%.2g%%), in %.2g times its time: <b>%s</b>.</li>\n",
                             lights->count, 100.0 * lights->error, lights->seconds / point.seconds,
-                            lights->seconds < point.seconds ? "lights win" : "the frequency domain wins");
+                            lights->seconds < point.seconds ? "lights win"
+                            : is_least                      ? "slower and closer, fewer are not charted"
+                                                            : "the frequency domain wins");
     }
   }
   const LightingPoint* const smooth =
