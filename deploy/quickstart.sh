@@ -51,7 +51,7 @@ deploy/install-deps.sh
 if [ ! -f build/release/CMakeCache.txt ]; then
   cmake --preset release -DTESSERA_BUILD_TESTS=OFF
 fi
-cmake --build --preset release --target tessera tessera-server
+cmake --build --preset release --target tessera tessera-server tessera-viewer
 built=$SECONDS
 cd "$output"
 PATH="$root/build/release/bin:$PATH"
