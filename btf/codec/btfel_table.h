@@ -42,6 +42,19 @@ struct BtfelTable {
   [[nodiscard]] std::span<const uint8_t> btfel(size_t index) const {
     return std::span(codes).subspan(index * num_coefficients, num_coefficients);
   }
+  // All but the codes.
+  [[nodiscard]] BtfelTable WithoutCodes() const {
+    return {.codec_id = codec_id,
+            .codec_version = codec_version,
+            .num_coefficients = num_coefficients,
+            .offset = offset,
+            .step = step,
+            .tables = tables,
+            .parameters = parameters,
+            .views = views,
+            .lights = lights,
+            .codes = {}};
+  }
 };
 
 }  // namespace tessera

@@ -77,6 +77,14 @@ absl::StatusOr<CoefficientTables> CoefficientTables::Create(std::string_view cod
   return result;
 }
 
+absl::StatusOr<CoefficientTables> CoefficientTables::Of(const BtfelTable& table) {
+  Shapes shapes;
+  for (const auto& [name, codec_table] : table.tables) {
+    shapes[name] = codec_table.shape;
+  }
+  return Create(table.codec_id, table.num_coefficients, shapes);
+}
+
 bool CoefficientTables::NeedsEntries(uint32_t coefficient) const {
   return std::ranges::any_of(rules_,
                              [&](const auto& rule) { return rule.second.column_of[coefficient] >= 0; });
@@ -91,18 +99,20 @@ std::vector<int64_t> CoefficientTables::EntriesOf(const std::string& table,
     return entries;
   }
   const Rule& rule = found->second;
-  std::vector<bool> wanted(static_cast<size_t>(rule.size / rule.block * rule.width), false);
-  const auto set = [&](std::span<const uint32_t> of, bool value) {
-    for (const uint32_t coefficient : of) {
-      if (rule.column_of[coefficient] >= 0) {
-        wanted[static_cast<size_t>(rule.column_of[coefficient])] = value;
-      }
+  std::vector<bool> taken(static_cast<size_t>(rule.size / rule.block * rule.width), false);
+  for (const uint32_t coefficient : before) {
+    if (rule.column_of[coefficient] >= 0) {
+      taken[static_cast<size_t>(rule.column_of[coefficient])] = true;
     }
-  };
-  set(coefficients, true);
-  set(before, false);
-  for (int64_t entry = 0; entry < rule.size; ++entry) {
-    if (wanted[static_cast<size_t>(entry / rule.block * rule.width + entry % rule.width)]) {
+  }
+  for (const uint32_t coefficient : coefficients) {
+    const int64_t column = rule.column_of[coefficient];
+    if (column < 0 || taken[static_cast<size_t>(column)]) {
+      continue;
+    }
+    taken[static_cast<size_t>(column)] = true;
+    const int64_t begin = column / rule.width * rule.block;
+    for (int64_t entry = begin + column % rule.width; entry < begin + rule.block; entry += rule.width) {
       entries.push_back(entry);
     }
   }

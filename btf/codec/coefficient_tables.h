@@ -15,6 +15,8 @@
 
 #include <absl/status/statusor.h>
 
+#include "btf/codec/btfel_table.h"
+
 namespace tessera {
 
 // Immutable.
@@ -28,12 +30,16 @@ class CoefficientTables {
   [[nodiscard]] static absl::StatusOr<CoefficientTables> Create(std::string_view codec_id,
                                                                 int num_coefficients, const Shapes& shapes);
 
+  // For a table's own tables. Errors: likewise.
+  [[nodiscard]] static absl::StatusOr<CoefficientTables> Of(const BtfelTable& table);
+
   // Whether the table's entries belong to single coefficients.
   [[nodiscard]] bool IsSplit(const std::string& table) const { return rules_.contains(table); }
   // Whether a coefficient means nothing without entries of tables.
   [[nodiscard]] bool NeedsEntries(uint32_t coefficient) const;
-  // The entries of a split table that belong to any of `coefficients` and to none of `before`, ascending,
-  // counted in row-major order. Both are below the number of coefficients. Linear in the table.
+  // The entries of a split table that belong to any of `coefficients` and to none of `before`, counted in
+  // row-major order: those of the first coefficient, ascending, then those of the next that are not among
+  // them. Both are below the number of coefficients.
   [[nodiscard]] std::vector<int64_t> EntriesOf(const std::string& table,
                                                std::span<const uint32_t> coefficients,
                                                std::span<const uint32_t> before) const;

@@ -208,13 +208,7 @@ absl::StatusOr<LevelSet> MakeLevelSet(const TileSet& tile_set, int level, const 
   }
   TESSERA_ASSIGN_OR_RETURN(const std::unique_ptr<Decoder> parts_decoder, MakeDecoder(from.btfels));
   TESSERA_ASSIGN_OR_RETURN(const auto turns, TurnMatrices(*parts_decoder, from.btfels, context));
-  far.btfels.codec_id = from.btfels.codec_id;
-  far.btfels.codec_version = from.btfels.codec_version;
-  far.btfels.num_coefficients = from.btfels.num_coefficients;
-  far.btfels.tables = from.btfels.tables;
-  far.btfels.parameters = from.btfels.parameters;
-  far.btfels.views = from.btfels.views;
-  far.btfels.lights = from.btfels.lights;
+  far.btfels = from.btfels.WithoutCodes();
   TESSERA_RETURN_IF_ERROR(JoinParts(from, mips.parts_per_texel, turns, context, far));
   TESSERA_ASSIGN_OR_RETURN(const std::unique_ptr<Decoder> decoder, MakeDecoder(far.btfels));
   result.rmse = RmseAgainst(from, mips.parts_per_texel, *parts_decoder, far, *decoder);

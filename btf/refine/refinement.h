@@ -7,10 +7,7 @@
 // would not lower the error is joined with the next, so that errors fall strictly or are 0.
 //
 // Errors are RMSE over RGB in reflectance, clamped at 0, against all coefficients, of texels spread evenly
-// over the tiles, each in its own frame:
-//   point        under each measured view, at most kRefineViews spread over them, two measured lights each;
-//   environment  from these views in five soft lights of irradiance pi, each the shape of a cosine lobe up to
-//                degree 2: from above, and from 45 degrees at four azimuths.
+// over the tiles, each in its own frame, over the cases of scene_cases.h.
 //
 //   TESSERA_ASSIGN_OR_RETURN(Refinement refinement, MakeRefinement(tile_set, SceneLight::kPoint, context));
 #pragma once
@@ -28,7 +25,6 @@
 namespace tessera {
 
 inline constexpr int kRefineTexels = 1024;
-inline constexpr int kRefineViews = 96;
 
 struct Refinement {
   std::vector<uint32_t> order;  // [k], by falling energy, ties by index

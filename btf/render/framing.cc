@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <functional>
 
 #include <absl/strings/str_cat.h>
 #include <Eigen/Geometry>
@@ -69,6 +70,34 @@ absl::Status CheckRange(const char* name, double value, double least, double mos
   return absl::OkStatus();
 }
 
+// The corners of a face, in pixels.
+using FaceInPicture = std::array<Eigen::Vector2d, 4>;
+
+// Of the faces before the eye that look at it.
+void ForFacesInPicture(const PreviewScene& scene, const std::function<void(const FaceInPicture&)>& body) {
+  const QuadMesh& mesh = scene.dressing->mesh;
+  if (mesh.quads.empty()) {
+    return;
+  }
+  const ViewFrame view = MakeViewFrame(scene.camera, TriangulateSurface(mesh));
+  const double focal_pixels = 0.5 * scene.height / view.tan_half_fov_y;
+  for (const Quad& quad : mesh.quads) {
+    FaceInPicture p;
+    bool is_before_eye = true;
+    for (int k = 0; k < 4; ++k) {
+      const Eigen::Vector3d from_eye = mesh.positions[quad[k]].cast<double>() - view.eye;
+      const double depth = -from_eye.dot(view.back);
+      is_before_eye = is_before_eye && depth > view.near;
+      p[k] = focal_pixels / depth * Eigen::Vector2d(from_eye.dot(view.right), from_eye.dot(view.up));
+    }
+    const Eigen::Vector2d a = p[2] - p[0];
+    const Eigen::Vector2d b = p[3] - p[1];
+    if (is_before_eye && a.x() * b.y() - a.y() * b.x() > 0.0) {
+      body(p);
+    }
+  }
+}
+
 }  // namespace
 
 Camera FramingCamera(const QuadMesh& mesh, int width, int height) {
@@ -128,32 +157,28 @@ std::vector<Light> DirectionalLights(std::span<const EnvironmentLight> lights) {
 }
 
 double TexelsPerPixel(const PreviewScene& scene) {
-  const QuadMesh& mesh = scene.dressing->mesh;
-  if (mesh.quads.empty()) {
-    return 0.0;
-  }
-  const ViewFrame view = MakeViewFrame(scene.camera, TriangulateSurface(mesh));
-  const double focal_pixels = 0.5 * scene.height / view.tan_half_fov_y;
   double pixels = 0.0;
   double faces = 0.0;
-  for (const Quad& quad : mesh.quads) {
-    std::array<Eigen::Vector2d, 4> p;
-    bool is_before_eye = true;
-    for (int k = 0; k < 4; ++k) {
-      const Eigen::Vector3d from_eye = mesh.positions[quad[k]].cast<double>() - view.eye;
-      const double depth = -from_eye.dot(view.back);
-      is_before_eye = is_before_eye && depth > view.near;
-      p[k] = focal_pixels / depth * Eigen::Vector2d(from_eye.dot(view.right), from_eye.dot(view.up));
-    }
+  ForFacesInPicture(scene, [&](const FaceInPicture& p) {
     const Eigen::Vector2d a = p[2] - p[0];
     const Eigen::Vector2d b = p[3] - p[1];
-    const double area = 0.5 * (a.x() * b.y() - a.y() * b.x());
-    if (is_before_eye && area > 0.0) {
-      pixels += area;
-      faces += 1.0;
-    }
-  }
+    pixels += 0.5 * (a.x() * b.y() - a.y() * b.x());
+    faces += 1.0;
+  });
   return pixels > 0.0 ? scene.tile_set->tile_size * std::sqrt(faces / pixels) : 0.0;
+}
+
+double PixelsPerQuad(const PreviewScene& scene) {
+  double most = 0.0;
+  ForFacesInPicture(scene, [&most](const FaceInPicture& p) {
+    // The larger singular value of [s t], as half a sum of two lengths.
+    const Eigen::Vector2d s = 0.5 * (p[1] - p[0] + p[2] - p[3]);
+    const Eigen::Vector2d t = 0.5 * (p[3] - p[0] + p[2] - p[1]);
+    const double sum = Eigen::Vector2d(s.x() + t.y(), s.y() - t.x()).norm();
+    const double difference = Eigen::Vector2d(s.x() - t.y(), s.y() + t.x()).norm();
+    most = std::max(most, 0.5 * (sum + difference));
+  });
+  return most;
 }
 
 }  // namespace tessera

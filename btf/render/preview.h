@@ -136,6 +136,11 @@ class GlPreview {
 // noise than the four samples of a pixel.
 [[nodiscard]] double TexelsPerPixel(const PreviewScene& scene);
 
+// How wide, in pixels, the widest of the faces that look at the eye is along its longest axis, hidden or not;
+// 0 where none does. What LevelForPixels (wang/scene_needs.h) asks for. The scene as RenderGl wants it, but
+// for the tile set.
+[[nodiscard]] double PixelsPerQuad(const PreviewScene& scene);
+
 // The same picture in double precision on the CPU: slow, for tests.
 [[nodiscard]] absl::StatusOr<Image> RenderReference(const PreviewScene& scene, const RunContext& run_context);
 

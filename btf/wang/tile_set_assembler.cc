@@ -5,6 +5,7 @@
 #include <functional>
 #include <limits>
 #include <numeric>
+#include <type_traits>
 
 #include <absl/strings/str_cat.h>
 
@@ -13,7 +14,9 @@
 #include "btf/codec/btfel_table_io.h"
 #include "btf/codec/container.h"
 #include "btf/codec/decoder.h"
+#include "btf/codec/quantize.h"
 #include "btf/wang/arrangement_header.h"
+#include "btf/wang/tile_set_layer_io.h"
 #include "btf/wang/tile_set_parts.h"
 #include "btf/wang/tile_set_parts_layout.h"
 
@@ -22,15 +25,10 @@ namespace {
 
 constexpr char kPartKey[] = "part";
 constexpr int kMostTexelsOfSide = 4096;
+// Of tiles that come in layers: their transforms take time with the cube of it.
+constexpr int kMostLayeredTexelsOfSide = 512;
 constexpr int kMostParts = 1 << 20;
 constexpr int64_t kMostCoefficients = int64_t{1} << 20;
-
-template <typename T>
-absl::StatusOr<std::vector<T>> ReadVector(const Container& container, std::string_view name) {
-  TESSERA_ASSIGN_OR_RETURN(const Section* section,
-                           RequireSection(container, name, DTypeOf<T>::value, std::array<int64_t, 1>{-1}));
-  return SectionValues<T>(*section);
-}
 
 bool AllFiniteValues(std::span<const float> values) {
   return std::ranges::all_of(values, [](float value) { return std::isfinite(value); });
@@ -52,7 +50,10 @@ absl::Status ReadEntries(const Container& container, const std::string& name,
                          std::span<const int64_t> entries, CodecTable& table) {
   const std::array<int64_t, 1> shape = {static_cast<int64_t>(entries.size())};
   TESSERA_ASSIGN_OR_RETURN(const Section* section, RequireSection(container, name, table.dtype, shape));
-  const auto scatter = [&](const auto& values) {
+  const auto scatter = [&]<typename T>(std::vector<T> values) {
+    if constexpr (std::is_integral_v<T>) {
+      std::partial_sum(values.begin(), values.end(), values.begin());
+    }
     for (size_t i = 0; i < entries.size(); ++i) {
       table.values[static_cast<size_t>(entries[i])] = static_cast<float>(values[i]);
     }
@@ -106,6 +107,39 @@ absl::StatusOr<CodecTable> EmptyTable(const std::string& name, const nlohmann::j
   return refused("dtype is none of u8, u16 and f32");
 }
 
+// All BTFels with what the layers say, with the range of values that each coefficient has.
+absl::Status QuantizeLayers(const LayerSum& sum, BtfelTable& table) {
+  constexpr size_t kBlock = 1024;
+  const auto k = static_cast<size_t>(table.num_coefficients);
+  const auto for_blocks = [&](const auto& body) {
+    for (size_t begin = 0; begin < sum.num_texels(); begin += kBlock) {
+      std::vector<uint32_t> texels(std::min(kBlock, sum.num_texels() - begin));
+      std::iota(texels.begin(), texels.end(), static_cast<uint32_t>(begin));
+      body(begin, sum.Coefficients(texels));
+    }
+  };
+  Eigen::RowVectorXf low = Eigen::RowVectorXf::Constant(table.num_coefficients, INFINITY);
+  Eigen::RowVectorXf high = -low;
+  bool is_finite = true;
+  for_blocks([&](size_t, const FloatRows& values) {
+    is_finite = is_finite && values.allFinite();
+    low = low.cwiseMin(values.colwise().minCoeff());
+    high = high.cwiseMax(values.colwise().maxCoeff());
+  });
+  if (!is_finite) {
+    return absl::InvalidArgumentError("layers: a coefficient is not finite");
+  }
+  Quantisation quantisation = UniformQuantisation(std::span(low.data(), k), std::span(high.data(), k));
+  table.codes.assign(sum.num_texels() * k, 0);
+  for_blocks([&](size_t begin, const FloatRows& values) {
+    const auto count = static_cast<size_t>(values.size());
+    Quantize(quantisation, std::span(values.data(), count), std::span(table.codes).subspan(begin * k, count));
+  });
+  table.offset = std::move(quantisation.offset);
+  table.step = std::move(quantisation.step);
+  return absl::OkStatus();
+}
+
 }  // namespace
 
 absl::StatusOr<TileSetAssembler> TileSetAssembler::Begin(std::span<const std::byte> part) {
@@ -116,8 +150,10 @@ absl::StatusOr<TileSetAssembler> TileSetAssembler::Begin(std::span<const std::by
   }
   TileSetAssembler assembler;
   assembler.first_sha256_ = Sha256Hex(part);
+  TESSERA_ASSIGN_OR_RETURN(const int parts, ReadInteger(container.header, "parts", 1, kMostParts));
+  assembler.parts_ = static_cast<size_t>(parts);
   TESSERA_RETURN_IF_ERROR(assembler.ReadHead(container));
-  TESSERA_RETURN_IF_ERROR(assembler.AddColumns(container));
+  TESSERA_RETURN_IF_ERROR(assembler.AddPart(container));
   // Whoever saves or draws the set meets the checks of every tile set here.
   TESSERA_RETURN_IF_ERROR(CheckTileSet(assembler.tile_set_));
   return assembler;
@@ -155,7 +191,6 @@ absl::Status TileSetAssembler::ReadTables(const nlohmann::json& header, const Co
   TESSERA_ASSIGN_OR_RETURN(table.views, ReadDirections("views", container));
   TESSERA_ASSIGN_OR_RETURN(table.lights, ReadDirections("lights", container));
   TESSERA_ASSIGN_OR_RETURN(const nlohmann::json tables, ReadObject(codec, "tables"));
-  CoefficientTables::Shapes shapes;
   uint64_t table_bytes = 0;
   for (const auto& [name, declared] : tables.items()) {
     TESSERA_ASSIGN_OR_RETURN(CodecTable empty, EmptyTable(name, declared));
@@ -164,11 +199,9 @@ absl::Status TileSetAssembler::ReadTables(const nlohmann::json& header, const Co
       return absl::InvalidArgumentError(
           absl::StrCat("codec tables of ", table_bytes, " bytes, at most ", kMaxExpandedBytes));
     }
-    shapes[name] = empty.shape;
     table.tables[name] = std::move(empty);
   }
-  TESSERA_ASSIGN_OR_RETURN(tables_,
-                           CoefficientTables::Create(table.codec_id, table.num_coefficients, shapes));
+  TESSERA_ASSIGN_OR_RETURN(tables_, CoefficientTables::Of(table));
   for (auto& [name, codec_table] : table.tables) {
     if (!tables_->IsSplit(name)) {
       std::vector<int64_t> all(codec_table.values.size());
@@ -237,25 +270,61 @@ absl::Status TileSetAssembler::ReadTiles(const Container& container) {
   if (labels_are == kPixelLabels) {
     tile_set_.source_pixels = std::move(labels);
   }
-  tile_set_.btfels.codes.assign(num_btfels_ * k, 0);
+  if (container.Find("scale") == nullptr) {
+    tile_set_.btfels.codes.assign(num_btfels_ * k, 0);
+    return absl::OkStatus();
+  }
+  if (w > kMostLayeredTexelsOfSide || num_btfels_ != num_tiles * texels) {
+    return absl::InvalidArgumentError(absl::StrCat("section 'tile_index': ", num_btfels_, " BTFels in ",
+                                                   num_tiles, " tiles of ", w, "x", w,
+                                                   " texels, expected one for each texel of at most ",
+                                                   kMostLayeredTexelsOfSide, "x", kMostLayeredTexelsOfSide));
+  }
+  TESSERA_ASSIGN_OR_RETURN(std::vector<float> scale, ReadFinite(container, "scale", k));
+  layers_.emplace(static_cast<int>(w), num_tiles, tile_set_.btfels.offset, std::move(scale));
   return absl::OkStatus();
 }
 
-absl::Status TileSetAssembler::AddColumns(const Container& container) {
+absl::Status TileSetAssembler::CheckNew(std::span<const uint32_t> coefficients) const {
   const auto k = static_cast<size_t>(tile_set_.btfels.num_coefficients);
-  TESSERA_ASSIGN_OR_RETURN(const std::vector<uint32_t> columns,
-                           ReadVector<uint32_t>(container, "coefficients"));
   std::vector<bool> taken(k, false);
   for (const uint32_t coefficient : held_) {
     taken[coefficient] = true;
   }
-  for (const uint32_t coefficient : columns) {
+  for (const uint32_t coefficient : coefficients) {
     if (coefficient >= k || taken[coefficient]) {
       return absl::InvalidArgumentError(absl::StrCat("section 'coefficients': ", coefficient, " of ", k,
                                                      " is out of range or came before"));
     }
     taken[coefficient] = true;
   }
+  return absl::OkStatus();
+}
+
+absl::Status TileSetAssembler::AddPart(const Container& container) {
+  TESSERA_RETURN_IF_ERROR(layers_.has_value() ? AddLayer(container) : AddColumns(container));
+  ++num_parts_;
+  Record();
+  return absl::OkStatus();
+}
+
+absl::StatusOr<BtfelTable> TileSetAssembler::TablesWith(std::span<const uint32_t> coefficients,
+                                                        const Container& container) const {
+  BtfelTable shared = tile_set_.btfels.WithoutCodes();
+  for (auto& [name, codec_table] : shared.tables) {
+    if (tables_->IsSplit(name)) {
+      TESSERA_RETURN_IF_ERROR(
+          ReadEntries(container, name, tables_->EntriesOf(name, coefficients, held_), codec_table));
+    }
+  }
+  return shared;
+}
+
+absl::Status TileSetAssembler::AddColumns(const Container& container) {
+  const auto k = static_cast<size_t>(tile_set_.btfels.num_coefficients);
+  TESSERA_ASSIGN_OR_RETURN(const std::vector<uint32_t> columns,
+                           ReadVector<uint32_t>(container, "coefficients"));
+  TESSERA_RETURN_IF_ERROR(CheckNew(columns));
   TESSERA_ASSIGN_OR_RETURN(const std::vector<float> offset, ReadFinite(container, "offset", columns.size()));
   TESSERA_ASSIGN_OR_RETURN(const std::vector<float> step, ReadFinite(container, "step", columns.size()));
   if (columns.empty() || std::ranges::any_of(step, [](float s) { return s < 0.0F; })) {
@@ -265,36 +334,38 @@ absl::Status TileSetAssembler::AddColumns(const Container& container) {
                                         static_cast<int64_t>(columns.size())};
   TESSERA_ASSIGN_OR_RETURN(const Section* codes,
                            RequireSection(container, absl::StrCat("btfels.", num_parts_), DType::kU8, shape));
-
   // Everything but the codes is tried on a copy first.
-  BtfelTable& table = tile_set_.btfels;
-  CodeBuffer all_codes = std::move(table.codes);
-  BtfelTable shared = table;
-  table.codes = std::move(all_codes);
+  TESSERA_ASSIGN_OR_RETURN(BtfelTable shared, TablesWith(columns, container));
   for (size_t i = 0; i < columns.size(); ++i) {
     shared.offset[columns[i]] = offset[i];
     shared.step[columns[i]] = step[i];
   }
-  for (auto& [name, codec_table] : shared.tables) {
-    if (tables_->IsSplit(name)) {
-      TESSERA_RETURN_IF_ERROR(
-          ReadEntries(container, name, tables_->EntriesOf(name, columns, held_), codec_table));
-    }
-  }
   TESSERA_RETURN_IF_ERROR(MakeDecoder(shared).status());
 
-  shared.codes = std::move(table.codes);
-  table = std::move(shared);
+  shared.codes = std::move(tile_set_.btfels.codes);
+  tile_set_.btfels = std::move(shared);
   const char* from = codes->bytes.data();
   for (size_t btfel = 0; btfel < num_btfels_; ++btfel) {
-    uint8_t* const to = table.codes.data() + btfel * k;
+    uint8_t* const to = tile_set_.btfels.codes.data() + btfel * k;
     for (const uint32_t coefficient : columns) {
       to[coefficient] = static_cast<uint8_t>(*from++);
     }
   }
   held_.insert(held_.end(), columns.begin(), columns.end());
-  ++num_parts_;
-  Record();
+  return absl::OkStatus();
+}
+
+absl::Status TileSetAssembler::AddLayer(const Container& container) {
+  TESSERA_ASSIGN_OR_RETURN(const TileSetLayer layer, ReadLayerSections(container, *layers_));
+  TESSERA_RETURN_IF_ERROR(CheckNew(layer.coefficients));
+  TESSERA_ASSIGN_OR_RETURN(BtfelTable shared, TablesWith(layer.coefficients, container));
+  LayerSum sum = *layers_;
+  TESSERA_RETURN_IF_ERROR(sum.Add(layer));
+  TESSERA_RETURN_IF_ERROR(QuantizeLayers(sum, shared));
+  TESSERA_RETURN_IF_ERROR(MakeDecoder(shared).status());
+  tile_set_.btfels = std::move(shared);
+  layers_ = std::move(sum);
+  held_.insert(held_.end(), layer.coefficients.begin(), layer.coefficients.end());
   return absl::OkStatus();
 }
 
@@ -307,7 +378,7 @@ absl::Status TileSetAssembler::Add(std::span<const std::byte> part) {
                                                       first.substr(0, 64), ", expected part ", num_parts_,
                                                       " of ", first_sha256_));
   }
-  return AddColumns(container);
+  return AddPart(container);
 }
 
 void TileSetAssembler::Record() {

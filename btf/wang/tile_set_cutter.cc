@@ -2,20 +2,31 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numeric>
+#include <type_traits>
 
 #include <absl/strings/str_cat.h>
 
 #include "btf/base/status_macros.h"
 #include "btf/codec/btfel_table_io.h"
 #include "btf/codec/container.h"
+#include "btf/wang/tile_set_layer_io.h"
 #include "btf/wang/tile_set_parts.h"
 #include "btf/wang/tile_set_parts_layout.h"
 
 namespace tessera {
 namespace {
 
-absl::Status CheckCut(const TileSet& tile_set, const TileSetCut& cut) {
-  const auto k = static_cast<size_t>(std::max(tile_set.btfels.num_coefficients, 0));
+absl::Status CheckTiles(const TileSet& tile_set, const TileSetCut& cut) {
+  if (std::ranges::adjacent_find(cut.tiles, std::greater_equal()) != cut.tiles.end() ||
+      (!cut.tiles.empty() && cut.tiles.back() >= tile_set.tile_codes.size())) {
+    return absl::InvalidArgumentError(
+        absl::StrCat("tiles: not strictly ascending below ", tile_set.tile_codes.size()));
+  }
+  return cut.origin.is_object() ? absl::OkStatus() : absl::InvalidArgumentError("origin: not an object");
+}
+
+absl::Status CheckColumns(const TileSetCut& cut, const CoefficientTables& tables, size_t k) {
   std::vector<bool> seen(k, false);
   for (const uint32_t coefficient : cut.order) {
     if (coefficient >= k || seen[coefficient]) {
@@ -31,34 +42,47 @@ absl::Status CheckCut(const TileSet& tile_set, const TileSetCut& cut) {
                                                    cut.fill.size(), ", parts of ",
                                                    cut.ends.empty() ? 0 : cut.ends.back(), ", expected ", k));
   }
-  if (std::ranges::adjacent_find(cut.tiles, std::greater_equal()) != cut.tiles.end() ||
-      (!cut.tiles.empty() && cut.tiles.back() >= tile_set.tile_codes.size())) {
-    return absl::InvalidArgumentError(
-        absl::StrCat("tiles: not strictly ascending below ", tile_set.tile_codes.size()));
+  for (size_t i = 0; i < k; ++i) {
+    const bool is_zero = cut.fill[i] == 0.0F;
+    if (!std::isfinite(cut.fill[i]) || (tables.NeedsEntries(static_cast<uint32_t>(i)) && !is_zero)) {
+      return absl::InvalidArgumentError(absl::StrCat("fill: ", cut.fill[i], " for coefficient ", i));
+    }
   }
-  return cut.origin.is_object() ? absl::OkStatus() : absl::InvalidArgumentError("origin: not an object");
+  return absl::OkStatus();
 }
 
-CoefficientTables::Shapes ShapesOf(const BtfelTable& table) {
-  CoefficientTables::Shapes shapes;
-  for (const auto& [name, codec_table] : table.tables) {
-    shapes[name] = codec_table.shape;
+// Whether the layers can be added up.
+absl::Status CheckLayers(const TileSetLayers& layers, const TileSet& tile_set, size_t k) {
+  if (k == 0 || layers.mean.size() != k || layers.scale.size() != k || layers.layers.empty()) {
+    return absl::InvalidArgumentError(absl::StrCat(layers.layers.size(), " layers, mean of ",
+                                                   layers.mean.size(), ", scale of ", layers.scale.size(),
+                                                   ", expected ", k));
   }
-  return shapes;
+  for (const auto& [name, table] : layers.tables) {
+    const auto of_set = tile_set.btfels.tables.find(name);
+    if (of_set == tile_set.btfels.tables.end() || of_set->second.dtype != table.dtype ||
+        of_set->second.values.size() != table.values.size()) {
+      return absl::InvalidArgumentError(absl::StrCat("layers: table '", name, "' is not the tile set's"));
+    }
+  }
+  LayerSum sum(tile_set.tile_size, tile_set.tile_codes.size(), layers.mean, layers.scale);
+  for (const TileSetLayer& layer : layers.layers) {
+    TESSERA_RETURN_IF_ERROR(sum.Add(layer));
+  }
+  return absl::OkStatus();
 }
 
-Section Compressed(Section section) {
-  section.encoding = Encoding::kZstd;
-  return section;
-}
-
-// The chosen entries of a table as they are stored; values of u8 and u16 tables are whole numbers.
+// The chosen entries of a table as they are stored; values of u8 and u16 tables are whole numbers, and
+// smooth.
 Section TableSection(const std::string& name, const CodecTable& table, std::span<const int64_t> entries) {
   const auto gather = [&]<typename T>(T) {
     std::vector<T> values;
     values.reserve(entries.size());
     for (const int64_t entry : entries) {
       values.push_back(static_cast<T>(table.values[static_cast<size_t>(entry)]));
+    }
+    if constexpr (std::is_integral_v<T>) {
+      std::adjacent_difference(values.begin(), values.end(), values.begin());
     }
     return MakeSection<T>(name, {static_cast<int64_t>(entries.size())}, std::span<const T>(values));
   };
@@ -83,17 +107,8 @@ std::vector<int64_t> AllEntries(const CodecTable& table) {
 }  // namespace
 
 absl::StatusOr<TileSetCutter> TileSetCutter::Create(const TileSet& tile_set, TileSetCut cut) {
-  TESSERA_RETURN_IF_ERROR(CheckCut(tile_set, cut));
-  TESSERA_ASSIGN_OR_RETURN(
-      CoefficientTables tables,
-      CoefficientTables::Create(tile_set.btfels.codec_id, tile_set.btfels.num_coefficients,
-                                ShapesOf(tile_set.btfels)));
-  for (size_t i = 0; i < cut.fill.size(); ++i) {
-    const bool is_zero = cut.fill[i] == 0.0F;
-    if (!std::isfinite(cut.fill[i]) || (tables.NeedsEntries(static_cast<uint32_t>(i)) && !is_zero)) {
-      return absl::InvalidArgumentError(absl::StrCat("fill: ", cut.fill[i], " for coefficient ", i));
-    }
-  }
+  TESSERA_RETURN_IF_ERROR(CheckTiles(tile_set, cut));
+  TESSERA_ASSIGN_OR_RETURN(CoefficientTables tables, CoefficientTables::Of(tile_set.btfels));
   const size_t texels_per_tile = static_cast<size_t>(tile_set.tile_size) * tile_set.tile_size;
   if (tile_set.tile_size < 1 || tile_set.tile_codes.empty() ||
       tile_set.tile_index.size() != tile_set.tile_codes.size() * texels_per_tile) {
@@ -107,12 +122,34 @@ absl::StatusOr<TileSetCutter> TileSetCutter::Create(const TileSet& tile_set, Til
           absl::StrCat("a texel names BTFel ", BtfelOfTexel(texel), " of ", tile_set.btfels.size()));
     }
   }
+  const auto k = static_cast<size_t>(std::max(tile_set.btfels.num_coefficients, 0));
+  TESSERA_RETURN_IF_ERROR(cut.layers == nullptr ? CheckColumns(cut, tables, k)
+                                                : CheckLayers(*cut.layers, tile_set, k));
   TileSetCutter cutter(tile_set, std::move(cut), std::move(tables));
   cutter.FindBtfels();
   return cutter;
 }
 
+size_t TileSetCutter::num_tiles() const {
+  return cut_.tiles.empty() ? tile_set_->tile_codes.size() : cut_.tiles.size();
+}
+
+size_t TileSetCutter::num_coefficients(size_t part) const {
+  if (cut_.layers == nullptr) {
+    return cut_.ends[part];
+  }
+  size_t count = 0;
+  for (size_t i = 0; i <= part; ++i) {
+    count += cut_.layers->layers[i].coefficients.size();
+  }
+  return count;
+}
+
 void TileSetCutter::FindBtfels() {
+  if (cut_.layers != nullptr) {
+    num_btfels_ = num_tiles() * static_cast<size_t>(tile_set_->tile_size) * tile_set_->tile_size;
+    return;
+  }
   std::vector<bool> used(tile_set_->btfels.size(), false);
   ForTiles(cut_.tiles, tile_set_->tile_codes.size(), [&](size_t tile) {
     const size_t texels = static_cast<size_t>(tile_set_->tile_size) * tile_set_->tile_size;
@@ -125,11 +162,13 @@ void TileSetCutter::FindBtfels() {
       btfels_.push_back(static_cast<uint32_t>(btfel));
     }
   }
+  num_btfels_ = btfels_.size();
 }
 
 bool TileSetCutter::KnowsPixels() const {
   const std::vector<uint32_t>& pixels = tile_set_->source_pixels;
-  return pixels.size() == tile_set_->btfels.size() && !pixels.empty() && pixels.back() <= kLargestLabel;
+  return cut_.layers == nullptr && pixels.size() == tile_set_->btfels.size() && !pixels.empty() &&
+         pixels.back() <= kLargestLabel;
 }
 
 std::vector<uint32_t> TileSetCutter::Labels() const {
@@ -164,12 +203,15 @@ absl::Status TileSetCutter::AddHead(Container& container) const {
 
   const auto w = static_cast<int64_t>(tile_set_->tile_size);
   const std::vector<uint32_t> labels = Labels();
+  const bool by_layers = cut_.layers != nullptr;
   std::vector<uint32_t> index;
   ForTiles(cut_.tiles, tile_set_->tile_codes.size(), [&](size_t tile) {
     std::vector<uint32_t> texels(static_cast<size_t>(w * w));
     for (size_t i = 0; i < texels.size(); ++i) {
       const uint32_t texel = tile_set_->tile_index[tile * texels.size() + i];
-      texels[i] = PackTexel(labels[BtfelOfTexel(texel)], TurnsOfTexel(texel));
+      const uint32_t label =
+          by_layers ? static_cast<uint32_t>(tile * texels.size() + i) : labels[BtfelOfTexel(texel)];
+      texels[i] = PackTexel(label, TurnsOfTexel(texel));
     }
     PredictTexels(tile_set_->tile_size, texels);
     index.insert(index.end(), texels.begin(), texels.end());
@@ -181,8 +223,13 @@ absl::Status TileSetCutter::AddHead(Container& container) const {
     container.sections.push_back(Compressed(MakeSection<uint32_t>("tiles", {num_tiles}, cut_.tiles)));
   }
   container.sections.push_back(Compressed(MakeSection<uint32_t>("tile_index", {num_tiles, w, w}, index)));
-  container.sections.push_back(
-      Compressed(MakeSection<float>("fill", {table.num_coefficients}, std::span<const float>(cut_.fill))));
+  const auto add = [&](const char* name, std::span<const float> values) {
+    container.sections.push_back(Compressed(MakeSection<float>(name, {table.num_coefficients}, values)));
+  };
+  add("fill", by_layers ? cut_.layers->mean : cut_.fill);
+  if (by_layers) {
+    add("scale", cut_.layers->scale);
+  }
   TESSERA_RETURN_IF_ERROR(AddDirections("views", table.views, container));
   TESSERA_RETURN_IF_ERROR(AddDirections("lights", table.lights, container));
   for (const auto& [name, codec_table] : table.tables) {
@@ -209,11 +256,7 @@ void TileSetCutter::AddColumns(size_t index, Container& container) const {
   container.sections.push_back(
       Compressed(MakeSection<float>("offset", {count}, std::span<const float>(offset))));
   container.sections.push_back(Compressed(MakeSection<float>("step", {count}, std::span<const float>(step))));
-  for (const auto& [name, codec_table] : table.tables) {
-    if (tables_.IsSplit(name)) {
-      container.sections.push_back(TableSection(name, codec_table, tables_.EntriesOf(name, columns, before)));
-    }
-  }
+  AddEntries(columns, before, container);
   Section codes;
   codes.name = absl::StrCat("btfels.", index);
   codes.dtype = DType::kU8;
@@ -229,6 +272,29 @@ void TileSetCutter::AddColumns(size_t index, Container& container) const {
   container.sections.push_back(Compressed(std::move(codes)));
 }
 
+void TileSetCutter::AddEntries(std::span<const uint32_t> coefficients, std::span<const uint32_t> before,
+                               Container& container) const {
+  for (const auto& [name, codec_table] : tile_set_->btfels.tables) {
+    if (tables_.IsSplit(name)) {
+      const CodecTable* table = &codec_table;
+      if (cut_.layers != nullptr && cut_.layers->tables.contains(name)) {
+        table = &cut_.layers->tables.at(name);
+      }
+      container.sections.push_back(TableSection(name, *table, tables_.EntriesOf(name, coefficients, before)));
+    }
+  }
+}
+
+void TileSetCutter::AddLayer(size_t index, Container& container) const {
+  std::vector<uint32_t> before;
+  for (size_t i = 0; i < index; ++i) {
+    const std::vector<uint32_t>& held = cut_.layers->layers[i].coefficients;
+    before.insert(before.end(), held.begin(), held.end());
+  }
+  AddLayerSections(*cut_.layers, index, cut_.tiles, tile_set_->tile_codes.size(), container);
+  AddEntries(cut_.layers->layers[index].coefficients, before, container);
+}
+
 absl::StatusOr<std::string> TileSetCutter::Part(size_t index, std::string_view first_sha256) const {
   Container container;
   container.kind = kTileSetPartKind;
@@ -239,7 +305,11 @@ absl::StatusOr<std::string> TileSetCutter::Part(size_t index, std::string_view f
   } else {
     container.header["first_sha256"] = first_sha256;
   }
-  AddColumns(index, container);
+  if (cut_.layers == nullptr) {
+    AddColumns(index, container);
+  } else {
+    AddLayer(index, container);
+  }
   return SerializeContainer(std::move(container));
 }
 

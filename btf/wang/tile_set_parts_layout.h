@@ -1,11 +1,18 @@
 // What the two halves of tile_set_parts share. Private to tile_set_*.cc.
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <span>
+#include <string_view>
 #include <vector>
+
+#include <absl/status/statusor.h>
+
+#include "btf/base/status_macros.h"
+#include "btf/codec/container.h"
 
 namespace tessera {
 
@@ -15,6 +22,19 @@ inline constexpr char kPixelLabels[] = "source_pixels";
 inline constexpr char kBtfelLabels[] = "btfels";
 // What PackTexel can hold.
 inline constexpr uint32_t kLargestLabel = (uint32_t{1} << 30) - 1;
+
+inline Section Compressed(Section section) {
+  section.encoding = Encoding::kZstd;
+  return section;
+}
+
+// A section with one extent. Errors: RequireSection's.
+template <typename T>
+absl::StatusOr<std::vector<T>> ReadVector(const Container& container, std::string_view name) {
+  TESSERA_ASSIGN_OR_RETURN(const Section* section,
+                           RequireSection(container, name, DTypeOf<T>::value, std::array<int64_t, 1>{-1}));
+  return SectionValues<T>(*section);
+}
 
 // body(tile) for the tiles named, or for all.
 inline void ForTiles(const std::vector<uint32_t>& tiles, size_t num_tiles,

@@ -42,7 +42,7 @@ absl::Status CheckPlan(const v1::TileSetPlan& plan) {
     const v1::TileSetPart& part = plan.parts(i);
     const uint32_t before = i == 0 ? 0 : plan.parts(i - 1).num_coefficients();
     const bool falls = i == 0 || part.rmse() <= plan.parts(i - 1).rmse();
-    if (part.sha256().size() != 64 || part.size_bytes() == 0 || part.num_coefficients() <= before ||
+    if (part.sha256().size() != 64 || part.size_bytes() == 0 || part.num_coefficients() < before ||
         part.num_coefficients() > plan.num_coefficients() || !(part.rmse() >= 0.0) || !falls) {
       return absl::DataLossError(absl::StrCat("the server's plan: part ", i, " of ", part.size_bytes(),
                                               " bytes with ", part.num_coefficients(), " of ",

@@ -13,7 +13,9 @@
 #include "btf/base/reason.h"
 #include "btf/base/sha256.h"
 #include "btf/base/status_macros.h"
+#include "btf/refine/level_layers.h"
 #include "btf/refine/level_set.h"
+#include "btf/refine/refinement.h"
 #include "server/jobs/job.h"
 
 namespace tessera {
@@ -104,7 +106,19 @@ absl::StatusOr<std::shared_ptr<const TileSetStreams::Source>> TileSetStreams::Fi
       source->level_rmse = level.rmse;
     }
   }
-  TESSERA_ASSIGN_OR_RETURN(source->refinement, MakeRefinement(*source->tile_set, needs.light, context));
+  if (needs.level == 0) {
+    TESSERA_ASSIGN_OR_RETURN(Refinement refinement, MakeRefinement(*source->tile_set, needs.light, context));
+    source->cut.order = std::move(refinement.order);
+    source->cut.ends = std::move(refinement.ends);
+    source->cut.fill = std::move(refinement.fill);
+    source->rmse = std::move(refinement.rmse);
+    source->directions = std::move(refinement.directions);
+  } else {
+    TESSERA_ASSIGN_OR_RETURN(LevelLayers layers, MakeLevelLayers(*source->tile_set, needs.light, context));
+    source->cut.layers = std::move(layers.layers);
+    source->rmse = std::move(layers.rmse);
+    source->directions = std::move(layers.directions);
+  }
   sources_.push_front(source);
   return source;
 }
@@ -120,16 +134,12 @@ absl::StatusOr<std::shared_ptr<TileSetStreams::Cut>> TileSetStreams::FindCut(con
   auto cut = std::make_shared<Cut>();
   cut->key = key;
   cut->source = source;
-  const Refinement& refinement = source->refinement;
-  TESSERA_ASSIGN_OR_RETURN(
-      TileSetCutter cutter,
-      TileSetCutter::Create(*source->tile_set, {.tiles = needs.tiles,
-                                                .order = refinement.order,
-                                                .ends = refinement.ends,
-                                                .fill = refinement.fill,
-                                                .origin = {{"tile_set_sha256", sha256},
-                                                           {"level", needs.level},
-                                                           {"light", SceneLightName(needs.light)}}}));
+  TileSetCut of_tiles = source->cut;
+  of_tiles.tiles = needs.tiles;
+  of_tiles.origin = {
+      {"tile_set_sha256", sha256}, {"level", needs.level}, {"light", SceneLightName(needs.light)}};
+  TESSERA_ASSIGN_OR_RETURN(TileSetCutter cutter,
+                           TileSetCutter::Create(*source->tile_set, std::move(of_tiles)));
   cut->cutter = std::make_unique<TileSetCutter>(std::move(cutter));
   cuts_.push_front(cut);
   return cut;
@@ -190,12 +200,12 @@ absl::StatusOr<PlannedStream> TileSetStreams::Plan(const v1::TileSet& tile_set, 
   plan.set_num_btfels(static_cast<uint32_t>(cut->cutter->num_btfels()));
   plan.set_num_coefficients(static_cast<uint32_t>(source.tile_set->btfels.num_coefficients));
   plan.set_level_rmse(source.level_rmse);
-  plan.set_directions(source.refinement.directions);
+  plan.set_directions(source.directions);
   uint64_t bytes = 0;
   for (size_t part = 0; part < cut->cutter->num_parts(); ++part) {
     TESSERA_RETURN_IF_ERROR(context.CheckStop());
     TESSERA_RETURN_IF_ERROR(MakePart(part, *cut));
-    const double reached = part == 0 ? 0.0 : source.refinement.rmse[part - 1];
+    const double reached = part == 0 ? 0.0 : source.rmse[part - 1];
     bytes += cut->parts[part]->size();
     if (needs.max_bytes.has_value() && bytes > *needs.max_bytes) {
       if (part == 0) {
@@ -212,14 +222,21 @@ absl::StatusOr<PlannedStream> TileSetStreams::Plan(const v1::TileSet& tile_set, 
     v1::TileSetPart& message = *plan.add_parts();
     message.set_sha256(cut->digests[part]);
     message.set_size_bytes(cut->parts[part]->size());
-    message.set_num_coefficients(source.refinement.ends[part]);
-    message.set_rmse(source.refinement.rmse[part]);
+    message.set_num_coefficients(static_cast<uint32_t>(cut->cutter->num_coefficients(part)));
+    message.set_rmse(source.rmse[part]);
     planned.parts.push_back(cut->parts[part]);
-    if (needs.max_error.has_value() && source.refinement.rmse[part] <= *needs.max_error) {
+    if (needs.max_error.has_value() && source.rmse[part] <= *needs.max_error) {
       break;
     }
   }
   DropUnused();
+  const double reached = plan.parts(plan.parts_size() - 1).rmse();
+  if (needs.max_error.value_or(0.0) > 0.0 && reached > *needs.max_error && !needs.max_bytes.has_value()) {
+    return WithReason(
+        absl::FailedPreconditionError(absl::StrCat("level ", needs.level, " reaches an error of ", reached,
+                                                   ", max_error is ", *needs.max_error)),
+        "BOUND_NOT_REACHED", "max_error");
+  }
   return planned;
 }
 

@@ -3,9 +3,9 @@
 //   TESSERA_ASSIGN_OR_RETURN(PlannedStream planned, streams.Plan(tile_set, needs, context));
 //
 // Kept by the digest of the tile set, at most kKeptStreamBytes of both kinds together, the longest unused
-// dropped first: the tile set, or a level of it, with the order of its coefficients and the errors of its
-// prefixes, for each kind of light; and the parts that a set of tiles was cut into, made when a plan first
-// reaches them.
+// dropped first: the tile set, or a level of it, with the order or the layers of its coefficients and the
+// errors of its prefixes, for each kind of light; and the parts that a set of tiles was cut into, made when a
+// plan first reaches them.
 #pragma once
 
 #include <cstdint>
@@ -19,7 +19,6 @@
 #include <absl/status/statusor.h>
 
 #include "btf/base/run_context.h"
-#include "btf/refine/refinement.h"
 #include "btf/wang/scene_needs.h"
 #include "btf/wang/tile_set.h"
 #include "btf/wang/tile_set_parts.h"
@@ -45,7 +44,8 @@ class TileSetStreams {
       : blobs_(blobs), limit_bytes_(limit_bytes) {}
 
   // Errors: INVALID_ARGUMENT naming the field and its limit; FAILED_PRECONDITION, reason BOUND_NOT_REACHED,
-  // naming what would be needed where max_bytes does not reach; those of MakeLevelSet; CANCELLED.
+  // naming what would be needed where max_bytes does not reach, and what a level reaches where max_error lies
+  // below; those of MakeLevelSet; CANCELLED.
   [[nodiscard]] absl::StatusOr<PlannedStream> Plan(const v1::TileSet& tile_set, const SceneNeeds& needs,
                                                    const RunContext& context);
 
@@ -55,7 +55,9 @@ class TileSetStreams {
     std::string key;
     std::shared_ptr<const TileSet> tile_set;
     double level_rmse = 0.0;
-    Refinement refinement;
+    TileSetCut cut;            // of all tiles: by coefficients, a level into layers
+    std::vector<double> rmse;  // of each prefix
+    std::string directions;    // what these errors are over, in words
   };
   // A source cut for some tiles; parts are made as they are asked for.
   struct Cut {

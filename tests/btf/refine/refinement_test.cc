@@ -12,55 +12,18 @@
 #include "btf/base/sha256.h"
 #include "btf/codec/decoder.h"
 #include "btf/wang/tile_set_parts.h"
-#include "tests/btf/codec/synthetic_btf.h"
-#include "tests/btf/render/hand_made.h"
+#include "tests/btf/refine/errors.h"
 #include "tests/support/codecs.h"
 
 namespace tessera {
 namespace {
-
-using testing::RandomTileSet;
-
-// Directions of the plan are a choice among all; with so few texels their errors differ by less than this.
-constexpr double kMostErrorRatio = 1.6;
-// Stored directions are float32.
-constexpr double kDirectionRounding = 1e-6;
-
-TileSet TileSetOf(const std::string& codec) {
-  SampledBtf btf = ShinyBtf(6, 6, RingDirections(3, 6), RingDirections(3, 7));
-  auto material =
-      Encode(codec, btf, {.kl = 16, .kv = 9, .eigen_textures = 3, .rank = codec == "dfmf" ? 16 : 0});
-  EXPECT_TRUE(material.ok()) << material.status();
-  return RandomTileSet(std::move(material->btfels), 4, 5);
-}
-
-// Over all texels of the table and all measured directions, by another way than the plan's.
-double RmseBetween(const TileSet& a, const TileSet& b) {
-  const auto decoder_a = *MakeDecoder(a.btfels);
-  const auto decoder_b = *MakeDecoder(b.btfels);
-  double squares = 0.0;
-  size_t count = 0;
-  for (const Direction& view : a.btfels.views) {
-    for (const Direction& light : a.btfels.lights) {
-      for (size_t i = 0; i < a.tile_index.size(); i += 37) {
-        const auto value = [&](const TileSet& set, const Decoder& decoder) {
-          return decoder.Decode(set.btfels.btfel(BtfelOfTexel(set.tile_index[i])), VectorFromDirection(light),
-                                VectorFromDirection(view), 0);
-        };
-        squares += (value(a, *decoder_a) - value(b, *decoder_b)).square().sum();
-        count += 3;
-      }
-    }
-  }
-  return std::sqrt(squares / static_cast<double>(count));
-}
 
 class CodecRefinementTest : public ::testing::TestWithParam<std::string> {};
 
 INSTANTIATE_TEST_SUITE_P(AllCodecs, CodecRefinementTest, ::testing::ValuesIn(AllCodecs()), CodecTestName);
 
 TEST_P(CodecRefinementTest, EveryPrefixIsAValidSetAndErrorsFallToNothing) {
-  const TileSet tile_set = TileSetOf(GetParam());
+  const TileSet tile_set = TileSetOf(GetParam(), 4);
   const auto k = static_cast<size_t>(tile_set.btfels.num_coefficients);
   const auto refinement = MakeRefinement(tile_set, SceneLight::kPoint, {});
   ASSERT_TRUE(refinement.ok()) << refinement.status();
@@ -98,7 +61,7 @@ TEST_P(CodecRefinementTest, EveryPrefixIsAValidSetAndErrorsFallToNothing) {
 }
 
 TEST_P(CodecRefinementTest, EnvironmentsHaveAnOrderOfTheirOwn) {
-  const TileSet tile_set = TileSetOf(GetParam());
+  const TileSet tile_set = TileSetOf(GetParam(), 4);
   const auto point = MakeRefinement(tile_set, SceneLight::kPoint, {});
   const auto sky = MakeRefinement(tile_set, SceneLight::kEnvironment, {});
   ASSERT_TRUE(point.ok()) << point.status();
@@ -111,7 +74,7 @@ TEST_P(CodecRefinementTest, EnvironmentsHaveAnOrderOfTheirOwn) {
 }
 
 TEST(RefinementTest, StopsWhenAsked) {
-  const TileSet tile_set = TileSetOf("dsh-cls");
+  const TileSet tile_set = TileSetOf("dsh-cls", 4);
   std::stop_source stop;
   stop.request_stop();
   EXPECT_TRUE(

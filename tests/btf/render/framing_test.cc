@@ -127,6 +127,21 @@ TEST(LightTurnedAbout, StaysWhereItIsForAnEyeThatTurnsWithIt) {
   }
 }
 
+TEST(PixelsPerQuad, IsTheLongestAxisOfTheWidestFaceThatFacesTheEye) {
+  // Two units wide, of 4 x 4 faces.
+  const Dressing dressing = RandomDressing(SkewedGrid(4, 0.0, 1), 2);
+  PreviewScene scene{.dressing = &dressing, .width = kFacingWidth, .height = kFacingHeight};
+  const double units_per_pixel = 2.0 * 3.0 * std::tan(0.5 * scene.camera.fov_y_rad) / kFacingHeight;
+  scene.camera.eye = {0.0, 0.0, 3.0};
+  EXPECT_NEAR(PixelsPerQuad(scene) * units_per_pixel, 0.5, 1e-5);
+  // From aside faces are foreshortened along one axis alone, and those nearer the eye are wider.
+  scene.camera.eye = {3.0 * std::sin(kPi / 3.0), 0.0, 1.5};
+  EXPECT_GT(PixelsPerQuad(scene) * units_per_pixel, 0.5);
+  EXPECT_LT(PixelsPerQuad(scene) * units_per_pixel, 0.75);
+  scene.camera.eye = {0.0, 0.0, -3.0};
+  EXPECT_EQ(PixelsPerQuad(scene), 0.0);
+}
+
 TEST(TexelsPerPixel, IsTheTexelsAlongAPixelOfAFacingPlane) {
   // Two units wide, of 4 x 4 tiles of 16 texels.
   const Dressing dressing = RandomDressing(SkewedGrid(4, 0.0, 1), 2);

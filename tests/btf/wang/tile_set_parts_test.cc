@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <limits>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -171,6 +172,124 @@ TEST(TileSetPartsTest, DamagedPartsAreRefused) {
   EXPECT_FALSE(assembler->Add(BytesOf(repeated)).ok());
   EXPECT_EQ(assembler->tile_set().btfels.size(), 50u);
   EXPECT_TRUE(assembler->Add(BytesOf(parts[1])).ok());
+}
+
+// Coefficients 0 to 5 by two components of waves over the tile, the others in a second part by one.
+TileSetCut LayeredCutOf(const TileSet& tile_set, std::vector<uint32_t> tiles = {}) {
+  const size_t num_tiles = tile_set.tile_codes.size();
+  TileSetLayers layers;
+  for (int i = 0; i < 12; ++i) {
+    layers.mean.push_back(0.1F * static_cast<float>(i));
+    layers.scale.push_back(1.0F + static_cast<float>(i));
+  }
+  TileSetLayer first{
+      .step = 0.25F, .coefficients = {0, 1, 2, 3, 4, 5}, .spans = {0, 0}, .basis_step = {0.01F, 0.5F}};
+  first.basis = {1, -2, 3, 0, 500, -6, 0, 0, 1, 1, 0, 0};
+  first.codes.assign(2 * 64 * num_tiles, 0);
+  TileSetLayer second{
+      .step = 0.01F, .coefficients = {6, 7, 8, 9, 10, 11}, .spans = {1}, .basis_step = {1.0F}};
+  second.basis = {1, 2, 3, 4, 5, 6};
+  second.codes.assign(3 * 64 * num_tiles, 0);
+  for (size_t tile = 0; tile < num_tiles; ++tile) {
+    first.codes[tile] = static_cast<int32_t>(tile) - 300;
+    first.codes[(64 + 5) * num_tiles + tile] = static_cast<int32_t>(tile % 3) - 1;
+    second.codes[(128 + 63) * num_tiles + tile] = static_cast<int32_t>(tile % 2);
+  }
+  layers.layers = {std::move(first), std::move(second)};
+  TileSetCut cut;
+  cut.tiles = std::move(tiles);
+  cut.layers = std::make_shared<const TileSetLayers>(std::move(layers));
+  return cut;
+}
+
+TEST(TileSetPartsTest, LayersAddUpToTheirSum) {
+  const TileSet tile_set = SmallTileSet("surface-26");
+  for (const std::vector<uint32_t>& tiles : {std::vector<uint32_t>{}, std::vector<uint32_t>{4, 20}}) {
+    const TileSetCut cut = LayeredCutOf(tile_set, tiles);
+    const std::vector<std::string> parts = PartsOf(tile_set, cut);
+    ASSERT_EQ(parts.size(), 2u);
+    LayerSum sum(8, 26, cut.layers->mean, cut.layers->scale);
+    auto assembler = TileSetAssembler::Begin(BytesOf(parts[0]));
+    ASSERT_TRUE(assembler.ok()) << assembler.status();
+    EXPECT_EQ(assembler->num_coefficients(), 6u);
+    for (size_t part = 0; part < 2; ++part) {
+      ASSERT_TRUE(sum.Add(cut.layers->layers[part]).ok());
+      if (part == 1) {
+        ASSERT_TRUE(assembler->Add(BytesOf(parts[1])).ok());
+      }
+      const TileSet& got = assembler->tile_set();
+      ASSERT_EQ(got.btfels.size(), 64 * (tiles.empty() ? 26 : tiles.size()));
+      for (const uint32_t tile : {4u, 20u}) {
+        for (int texel = 0; texel < 64; ++texel) {
+          const FloatRows expected =
+              sum.Coefficients(std::vector<uint32_t>{tile * 64 + static_cast<uint32_t>(texel)});
+          const uint32_t packed = got.tile_index[tile * 64 + texel];
+          EXPECT_EQ(TurnsOfTexel(packed), TurnsOfTexel(tile_set.tile_index[tile * 64 + texel]));
+          for (int i = 0; i < 12; ++i) {
+            const float value =
+                got.btfels.offset[i] + got.btfels.step[i] * got.btfels.btfel(BtfelOfTexel(packed))[i];
+            ASSERT_NEAR(value, expected(0, i), 0.501F * got.btfels.step[i] + 1e-4F)
+                << part << " " << tile << " " << i;
+          }
+        }
+      }
+    }
+    EXPECT_TRUE(assembler->is_complete());
+  }
+}
+
+TEST(TileSetPartsTest, DamagedLayersAreRefused) {
+  const TileSet tile_set = SmallTileSet("surface-26");
+  const std::vector<std::string> parts = PartsOf(tile_set, LayeredCutOf(tile_set));
+  const auto begin_fails = [&](const auto& change, const char* what) {
+    const auto assembler = TileSetAssembler::Begin(BytesOf(Changed(parts[0], change)));
+    EXPECT_FALSE(assembler.ok()) << what;
+    EXPECT_THAT(assembler.status().message(), HasSubstr(what));
+  };
+  const auto set = [](Container& c, const char* name, size_t element, uint32_t bits) {
+    PartSection(c, name).bytes.replace(4 * element, 4, reinterpret_cast<const char*>(&bits), 4);
+  };
+  begin_fails([&](Container& c) { set(c, "layer_step", 0, 0); }, "step 0");
+  begin_fails([&](Container& c) { set(c, "layer_step", 0, 0x7fc00000); }, "step nan");
+  begin_fails([&](Container& c) { set(c, "basis_step", 1, 0xbf800000); }, "basis_step");
+  begin_fails([&](Container& c) { set(c, "basis_step", 0, 0x7f7fffff); }, "not finite");
+  begin_fails([&](Container& c) { set(c, "spans", 1, 1); }, "'spans': layer 1");
+  begin_fails([&](Container& c) { set(c, "reach", 0, 65); }, "'reach': 2 values");
+  begin_fails([&](Container& c) { set(c, "reach", 0, 2); }, "'codes'");
+  begin_fails([&](Container& c) { set(c, "scale", 3, 0x7f800000); }, "'scale'");
+  begin_fails([&](Container& c) { PartSection(c, "codes").bytes[0] = 3; }, "'codes_large'");
+  begin_fails(
+      [&](Container& c) {
+        Section& large = PartSection(c, "basis_large");
+        large.shape[0] = 0;
+        large.bytes.clear();
+      },
+      "'basis_large'");
+  // Two texels of one BTFel: not what layers are.
+  begin_fails([&](Container& c) { set(c, "tile_index", 7, 0); }, "expected one for each texel");
+
+  auto assembler = TileSetAssembler::Begin(BytesOf(parts[0]));
+  ASSERT_TRUE(assembler.ok());
+  const std::string repeated = Changed(parts[1], [&](Container& c) { set(c, "coefficients", 0, 5); });
+  EXPECT_FALSE(assembler->Add(BytesOf(repeated)).ok());
+  EXPECT_EQ(assembler->num_coefficients(), 6u);
+  EXPECT_TRUE(assembler->Add(BytesOf(parts[1])).ok());
+}
+
+TEST(TileSetPartsTest, CutsIntoLayersAreChecked) {
+  const TileSet tile_set = SmallTileSet("surface-26");
+  const auto refused = [&](const auto& change, const char* what) {
+    TileSetCut cut = LayeredCutOf(tile_set);
+    TileSetLayers layers = *cut.layers;
+    change(layers);
+    cut.layers = std::make_shared<const TileSetLayers>(std::move(layers));
+    const absl::Status status = TileSetCutter::Create(tile_set, std::move(cut)).status();
+    EXPECT_TRUE(absl::IsInvalidArgument(status)) << what;
+    EXPECT_THAT(status.message(), HasSubstr(what));
+  };
+  refused([](TileSetLayers& layers) { layers.mean.pop_back(); }, "mean of 11");
+  refused([](TileSetLayers& layers) { layers.layers[1].spans = {2}; }, "layer 2");
+  refused([](TileSetLayers& layers) { layers.tables["luma"] = {}; }, "table 'luma'");
 }
 
 TEST(SceneNeedsTest, FollowFromADressingAndItsSize) {

@@ -124,7 +124,7 @@ TEST_F(TileSetStreamTest, OnlyWhatIsNeededMoves) {
   EXPECT_GT(bounded.progress.rmse(), 0.0);
   const StreamedTileSet far = Stream({.level = 3, .light = SceneLight::kEnvironment});
   EXPECT_EQ(far.tile_set.tile_size, 1);
-  EXPECT_EQ(far.progress.rmse(), 0.0);
+  EXPECT_LE(far.progress.rmse(), 0.004);
   EXPECT_LT(far.progress.part_bytes, whole.progress.part_bytes);
   EXPECT_THAT(far.progress.plan.directions(), HasSubstr("soft lights"));
 }
@@ -195,6 +195,8 @@ TEST_F(TileSetStreamTest, NeedsThatCannotBeMetAreNamed) {
   const v1::TileSetPlan plan = Stream({}).progress.plan;
   const uint64_t two_parts = plan.parts(0).size_bytes() + plan.parts(1).size_bytes();
   refused({.max_error = 0.0, .max_bytes = two_parts}, "max_bytes", "reaches an error of");
+  EXPECT_EQ(refused({.level = 2, .max_error = 1e-7}, "max_error", "level 2 reaches an error of"),
+            "BOUND_NOT_REACHED");
   EXPECT_TRUE(absl::IsNotFound(client_->StreamTileSet("arrangements/surface-96/tileSets/none", {}).status()));
 }
 

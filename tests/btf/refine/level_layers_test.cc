@@ -1,0 +1,112 @@
+#include "btf/refine/level_layers.h"
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+#include <vector>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "btf/base/sha256.h"
+#include "btf/refine/level_set.h"
+#include "btf/wang/tile_set_parts.h"
+#include "tests/btf/refine/errors.h"
+
+namespace tessera {
+namespace {
+
+// Of the values, which are rounded anew.
+constexpr double k8BitRmse = 0.003;
+
+TileSet LevelOf(const std::string& codec) {
+  auto level = MakeLevelSet(TileSetOf(codec, 8), 1, {});
+  EXPECT_TRUE(level.ok()) << level.status();
+  return std::move(level->tile_set);
+}
+
+class CodecLayersTest : public ::testing::TestWithParam<std::string> {};
+
+INSTANTIATE_TEST_SUITE_P(AllCodecs, CodecLayersTest, ::testing::ValuesIn(AllCodecs()), CodecTestName);
+
+// The plan's errors against those of the sets that the parts make, over all directions.
+TEST_P(CodecLayersTest, EveryPrefixIsAValidSetWhoseErrorIsAsStated) {
+  const TileSet level = LevelOf(GetParam());
+  const auto layered = MakeLevelLayers(level, SceneLight::kPoint, {});
+  ASSERT_TRUE(layered.ok()) << layered.status();
+  const auto cutter = TileSetCutter::Create(level, {.layers = layered->layers});
+  ASSERT_TRUE(cutter.ok()) << cutter.status();
+  ASSERT_EQ(cutter->num_parts(), layered->rmse.size());
+  ASSERT_GE(cutter->num_parts(), 3u);
+  EXPECT_LE(layered->rmse.back(), kLevelEndRmse);
+  EXPECT_TRUE(std::ranges::is_sorted(layered->rmse, std::greater()));
+  const std::string first = cutter->Part(0, "").value();
+  auto assembler = TileSetAssembler::Begin(std::as_bytes(std::span(first)));
+  ASSERT_TRUE(assembler.ok()) << assembler.status();
+  for (size_t i = 0; i < cutter->num_parts(); ++i) {
+    if (i > 0) {
+      const std::string part = cutter->Part(i, Sha256Hex(std::as_bytes(std::span(first)))).value();
+      const absl::Status added = assembler->Add(std::as_bytes(std::span(part)));
+      ASSERT_TRUE(added.ok()) << added;
+    }
+    EXPECT_EQ(assembler->num_coefficients(), cutter->num_coefficients(i));
+    EXPECT_EQ(assembler->is_complete(), i + 1 == cutter->num_parts());
+    const auto bytes = SerializeTileSet(assembler->tile_set());
+    ASSERT_TRUE(bytes.ok()) << bytes.status();
+    const auto parsed = ParseTileSet(std::as_bytes(std::span(*bytes)));
+    ASSERT_TRUE(parsed.ok()) << parsed.status();
+    const double rmse = RmseBetween(level, *parsed);
+    EXPECT_LE(rmse, layered->rmse[i] * kMostErrorRatio + k8BitRmse) << "part " << i;
+    EXPECT_GE(rmse, layered->rmse[i] / kMostErrorRatio) << "part " << i;
+  }
+}
+
+// What a mean alone costs few bytes for: smooth tiles of a material whose texels differ along one line.
+TEST_P(CodecLayersTest, OneComponentServesAMaterialOfOneDimension) {
+  TileSet level = LevelOf(GetParam());
+  BtfelTable& table = level.btfels;
+  const auto k = static_cast<size_t>(table.num_coefficients);
+  for (size_t btfel = 0; btfel < table.size(); ++btfel) {
+    const auto share = static_cast<double>(btfel) / static_cast<double>(table.size());
+    for (size_t c = 0; c < k; ++c) {
+      const double end = table.codes[c];
+      table.codes.data()[btfel * k + c] = static_cast<uint8_t>(std::lround(128.0 + share * (end - 128.0)));
+    }
+  }
+  const auto layered = MakeLevelLayers(level, SceneLight::kPoint, {});
+  ASSERT_TRUE(layered.ok()) << layered.status();
+  size_t components = 0;
+  for (const TileSetLayer& layer : layered->layers->layers) {
+    components += layer.spans.size();
+  }
+  // Codecs with tables bring coefficients in several layers, and each layer has components of its own.
+  EXPECT_LE(components, 3 * layered->layers->layers.size());
+  EXPECT_LE(layered->rmse.back(), kLevelEndRmse);
+}
+
+TEST_P(CodecLayersTest, EnvironmentsHaveComponentsOfTheirOwnAndAllIsRepeatable) {
+  const TileSet level = LevelOf(GetParam());
+  const auto sky = MakeLevelLayers(level, SceneLight::kEnvironment, {});
+  const auto again = MakeLevelLayers(level, SceneLight::kEnvironment, {});
+  ASSERT_TRUE(sky.ok()) << sky.status();
+  ASSERT_TRUE(again.ok()) << again.status();
+  EXPECT_THAT(sky->directions, ::testing::HasSubstr("soft lights"));
+  EXPECT_EQ(sky->rmse, again->rmse);
+  const auto part = [&](const LevelLayers& layers) {
+    return TileSetCutter::Create(level, {.tiles = {3, 90}, .layers = layers.layers})->Part(0, "").value();
+  };
+  EXPECT_EQ(part(*sky), part(*again));
+  const auto point = MakeLevelLayers(level, SceneLight::kPoint, {});
+  EXPECT_NE(part(*sky), part(*point));
+}
+
+TEST(LevelLayersTest, StopsWhenAsked) {
+  const TileSet level = LevelOf("dsh-cls");
+  std::stop_source stop;
+  stop.request_stop();
+  EXPECT_TRUE(
+      absl::IsCancelled(MakeLevelLayers(level, SceneLight::kPoint, {.stop = stop.get_token()}).status()));
+}
+
+}  // namespace
+}  // namespace tessera
