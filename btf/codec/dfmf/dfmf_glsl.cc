@@ -157,6 +157,9 @@ vec3 BlendUnturned(ivec4 btfels, vec4 weights, int count, Incidence light, vec3 
   return out;
 }
 
+// Even codes times even factors, both 2^16 times too high, are to come out as odd ones do.
+constexpr char kScaleEvenCodes[] = "    even_codes *= 2.3283064365386963e-10;\n";
+
 // Adds to the colour `sum` what the blended codes of group `group` are under each of `n` harmonics.
 std::string AddUnderHarmonics(const std::string& group, const std::string& sum, int n) {
   std::string out = absl::Substitute("    at = words + ($0) * $1;\n", group, n);
@@ -168,9 +171,10 @@ std::string AddUnderHarmonics(const std::string& group, const std::string& sum, 
     absl::StrAppend(&out, absl::Substitute(R"(    u0 = texelFetch(harmonics_words, at.x + $0);
     u1 = texelFetch(harmonics_words, at.y + $0);
     u2 = texelFetch(harmonics_words, at.z + $0);
-    even = view_weights.x * Low(u0) + view_weights.y * Low(u1) + view_weights.z * Low(u2);
-    odd = view_weights.x * High(u0) + view_weights.y * High(u1) + view_weights.z * High(u2);
-    $1 += (q[$2] * (dot(even, even_codes) * 2.3283064365386963e-10 + dot(odd, odd_codes))) * light[$0];
+    at_nodes = vec3(dot(Low(u0), even_codes) + dot(High(u0), odd_codes),
+                    dot(Low(u1), even_codes) + dot(High(u1), odd_codes),
+                    dot(Low(u2), even_codes) + dot(High(u2), odd_codes));
+    $1 += (q[$2] * dot(view_weights, at_nodes)) * light[$0];
 )",
                                            i, sum, i % 4));
   }
@@ -185,20 +189,20 @@ std::string SourceOfHarmonics(const Layout& layout, int n) {
 vec3 BlendUnturned(ivec4 btfels, vec4 weights, int count, Incidence light, vec3 view) {
   bool is_lit = view.z > 0.0 && count > 0;
   ivec3 view_nodes, at;
-  vec3 view_weights, luma = vec3(0.0), first_chroma = vec3(0.0), second_chroma = vec3(0.0);
+  vec3 view_weights, at_nodes, luma = vec3(0.0), first_chroma = vec3(0.0), second_chroma = vec3(0.0);
   FindNodes(view, texelFetch(codec_values, 0).z, $0, view_nodes, view_weights);
   ivec3 words = view_nodes * $1;
   uvec4 u, u0, u1, u2;
-  vec4 q, even, odd;
+  vec4 q;
   int n, g = 0;
   do {
 )",
                        layout.view_nodes, layout.num_groups() * n),
-      BlendCodes("g", layout.btfel_texels()), AddUnderHarmonics("g", "luma", n), "  } while (++g < ",
-      layout.luma_groups, ");\n");
+      BlendCodes("g", layout.btfel_texels()), kScaleEvenCodes, AddUnderHarmonics("g", "luma", n),
+      "  } while (++g < ", layout.luma_groups, ");\n");
   if (layout.chroma_groups > 0) {
     const std::string first = absl::StrCat("g + ", layout.luma_groups);
-    absl::StrAppend(&out, "  g = 0;\n  do {\n", BlendCodes(first, layout.btfel_texels()),
+    absl::StrAppend(&out, "  g = 0;\n  do {\n", BlendCodes(first, layout.btfel_texels()), kScaleEvenCodes,
                     AddUnderHarmonics(first, "first_chroma", n),
                     AddUnderHarmonics(absl::StrCat("g + ", layout.luma_groups + layout.chroma_groups),
                                       "second_chroma", n),
