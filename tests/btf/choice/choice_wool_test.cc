@@ -1,4 +1,5 @@
-// Choices on the measured wool [Sattler2003], 128x128 texels, 81 views and lights.
+// Choices on the measured wool [Sattler2003], 81 views and lights: the uppermost 40 of its 128 rows, in a third of the
+// time.
 #include <chrono>
 #include <cstdio>
 
@@ -13,12 +14,30 @@
 namespace tessera {
 namespace {
 
+constexpr int kRows = 40;
+
+class TopRows final : public BtfSource {
+ public:
+  explicit TopRows(std::unique_ptr<BtfSource> source) : source_(std::move(source)), info_(source_->info()) {
+    info_.height = kRows;
+  }
+  [[nodiscard]] const BtfInfo& info() const override { return info_; }
+  [[nodiscard]] absl::Status ReadRows(int row_begin, int num_rows, std::span<float> samples,
+                                      const RunContext& context) override {
+    return source_->ReadRows(row_begin, num_rows, samples, context);
+  }
+
+ private:
+  std::unique_ptr<BtfSource> source_;
+  BtfInfo info_;
+};
+
 std::unique_ptr<BtfSource> Wool() {
   ImportOptions options;
   options.transfer = *ParseTransfer("gamma:2.2");
   auto source = ImportBtf(TestData(kWool), options, {});
   EXPECT_TRUE(source.ok()) << source.status();
-  return *std::move(source);
+  return std::make_unique<TopRows>(*std::move(source));
 }
 
 TEST(ChoiceWoolTest, ATighterBoundTakesMoreBytes) {
