@@ -111,7 +111,7 @@ std::pair<Eigen::VectorXd, int> Joined(const BtfelTable& table, std::span<const 
   return {std::move(sum), turn};
 }
 
-// Quantised, with a range of its own; equal BTFels are not looked for: parts of several turns hardly repeat.
+// Quantised, with a range of its own.
 absl::Status JoinParts(const MipLevel& level, int parts_per_texel,
                        const std::array<Eigen::MatrixXd, 4>& turns, const RunContext& context,
                        TileSet& joined) {
@@ -199,10 +199,16 @@ absl::StatusOr<LevelSet> MakeLevelSet(const TileSet& tile_set, int level, const 
   far.provenance = tile_set.provenance;
   far.radiometry = tile_set.radiometry;
   if (mips.parts_per_texel == 1) {
+    far.btfels = from.btfels.WithoutCodes();
+    std::vector<uint8_t> codes;
+    codes.reserve(from.parts.size() * from.btfels.num_coefficients);
     for (const MipPart& part : from.parts) {
-      far.tile_index.push_back(part.texel);
+      const auto btfel = from.btfels.btfel(BtfelOfTexel(part.texel));
+      far.tile_index.push_back(
+          PackTexel(static_cast<uint32_t>(far.tile_index.size()), TurnsOfTexel(part.texel)));
+      codes.insert(codes.end(), btfel.begin(), btfel.end());
     }
-    far.btfels = std::move(from.btfels);
+    far.btfels.codes = CodeBuffer(std::move(codes));
     result.rmse = from.quantisation_rmse;
     return result;
   }

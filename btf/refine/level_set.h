@@ -22,7 +22,8 @@ inline constexpr int kTurnLights = 12;
 inline constexpr int kMostTurnedCoefficients = 2048;
 
 struct LevelSet {
-  // Tiles of w / 2^level texels; no source pixels, seams or certificate.
+  // Tiles of w / 2^level texels, each a BTFel of its own, in the order of the texels; no source pixels, seams
+  // or certificate.
   TileSet tile_set;
   // RMSE against the level with its parts, in reflectance, over texels spread over the tiles and a few
   // measured directions: of the turning and, where texels had several parts, of 8 bits.

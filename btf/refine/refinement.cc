@@ -5,103 +5,130 @@
 #include <memory>
 #include <numeric>
 #include <span>
+#include <utility>
 
-#include <absl/strings/str_cat.h>
 #include <Eigen/Core>
 
 #include "btf/base/status_macros.h"
 #include "btf/codec/coefficient_tables.h"
 #include "btf/codec/decoder.h"
 #include "btf/refine/scene_cases.h"
+#include "btf/refine/set_layers.h"
 
 namespace tessera {
 namespace {
 
-// Of the coefficients, the first prefix; each further one is kPrefixGrowth times as long.
+// Of the coefficients, the first part.
 constexpr double kFirstShare = 1.0 / 32.0;
 constexpr double kPrefixGrowth = 1.41421356237;
+constexpr uint32_t kMostExactParts = 512;
 
-std::vector<uint32_t> PrefixEnds(size_t k) {
+uint32_t FirstEnd(size_t k) {
+  return static_cast<uint32_t>(std::ceil(kFirstShare * static_cast<double>(k)));
+}
+
+// Of the prefixes where there are layers: the first before them, the others behind.
+std::vector<uint32_t> EndsAroundLayers(const BtfelTable& table) {
+  const auto k = static_cast<uint32_t>(table.num_coefficients);
+  const auto count = static_cast<uint32_t>(
+      std::max<size_t>({1, kExactPartBytes / std::max<size_t>(table.size(), 1), k / kMostExactParts}));
   std::vector<uint32_t> ends;
-  for (double end = std::max(1.0, std::ceil(kFirstShare * static_cast<double>(k)));
-       end < static_cast<double>(k); end = std::max(std::ceil(end * kPrefixGrowth), end + 1.0)) {
+  for (uint32_t end = FirstEnd(k); end < k; end += std::min(count, k - end)) {
+    ends.push_back(end);
+  }
+  ends.push_back(k);
+  return ends;
+}
+
+// Without layers.
+std::vector<uint32_t> GrowingEnds(size_t k) {
+  std::vector<uint32_t> ends;
+  for (double end = FirstEnd(k); end < static_cast<double>(k);
+       end = std::max(std::ceil(end * kPrefixGrowth), end + 1.0)) {
     ends.push_back(static_cast<uint32_t>(end));
   }
   ends.push_back(static_cast<uint32_t>(k));
   return ends;
 }
 
-// Means over the texels, 0 where a coefficient needs entries of tables; the values become differences to
-// them.
-absl::StatusOr<std::vector<float>> TakeFill(const BtfelTable& table, FloatRows& values) {
-  TESSERA_ASSIGN_OR_RETURN(const CoefficientTables tables, CoefficientTables::Of(table));
+// Means over the rows, 0 where a coefficient needs entries of tables.
+std::vector<float> FillOf(const CoefficientTables& tables, const FloatRows& values) {
   std::vector<float> fill(values.cols(), 0.0F);
   for (Eigen::Index i = 0; i < values.cols(); ++i) {
     if (!tables.NeedsEntries(static_cast<uint32_t>(i)) && values.rows() > 0) {
       fill[i] = static_cast<float>(values.col(i).cast<double>().mean());
-      values.col(i).array() -= fill[i];
     }
   }
   return fill;
 }
 
-// The columns of `from` in this order.
-FloatRows Permuted(const Eigen::Ref<const FloatRows>& from, std::span<const uint32_t> order) {
-  FloatRows to(from.rows(), from.cols());
-  for (size_t i = 0; i < order.size(); ++i) {
-    to.col(static_cast<Eigen::Index>(i)) = from.col(order[i]);
-  }
-  return to;
-}
-
 }  // namespace
 
-absl::StatusOr<Refinement> MakeRefinement(const TileSet& tile_set, SceneLight light,
+absl::StatusOr<Refinement> MakeRefinement(const BtfelTable& table, const RefinementOptions& options,
                                           const RunContext& context) {
-  const BtfelTable& table = tile_set.btfels;
   TESSERA_ASSIGN_OR_RETURN(const std::unique_ptr<Decoder> decoder, MakeDecoder(table));
+  TESSERA_ASSIGN_OR_RETURN(const CoefficientTables tables, CoefficientTables::Of(table));
+  const SceneCases cases = MakeSceneCases(*decoder, table, options.light);
   const auto k = static_cast<size_t>(table.num_coefficients);
-  const SceneCases cases = MakeSceneCases(*decoder, table, light);
   Refinement refinement;
   refinement.directions = cases.directions;
+  TileSetCut& cut = refinement.cut;
+  if (options.level_tile_size > 0) {
+    TESSERA_ASSIGN_OR_RETURN(
+        SetLayers layers,
+        MakeSetLayers(table, {.block_side = options.level_tile_size, .exact = {}, .light = options.light},
+                      context));
+    cut.fill.assign(k, 0.0F);
+    cut.layers = std::move(layers.layers);
+    refinement.rmse = std::move(layers.rmse);
+    return refinement;
+  }
   TESSERA_RETURN_IF_ERROR(context.CheckStop());
-  TESSERA_ASSIGN_OR_RETURN(FloatRows values,
-                           CoefficientsOf(tile_set, Spread(tile_set.tile_index.size(), kRefineTexels)));
-  TESSERA_ASSIGN_OR_RETURN(refinement.fill, TakeFill(table, values));
-
+  const FloatRows values = CoefficientsOf(table, Spread(table.size(), kRefineBtfels));
+  const FloatRows whole = values * cases.weights.transpose();
+  cut.fill = FillOf(tables, values);
+  const Eigen::Map<const Eigen::RowVectorXf> fill(cut.fill.data(), static_cast<Eigen::Index>(k));
   std::vector<double> energy(k);
   for (size_t i = 0; i < k; ++i) {
     const auto column = static_cast<Eigen::Index>(i);
     energy[i] = cases.weights.col(column).cast<double>().squaredNorm() *
-                values.col(column).cast<double>().squaredNorm();
+                (values.col(column).array() - fill[column]).cast<double>().matrix().squaredNorm();
   }
-  refinement.order.resize(k);
-  std::iota(refinement.order.begin(), refinement.order.end(), 0U);
-  std::ranges::stable_sort(refinement.order, [&](uint32_t a, uint32_t b) { return energy[a] > energy[b]; });
-
-  // [texels][3 * cases]: first of the fill alone, then of more and more coefficients.
-  const Eigen::Map<const Eigen::RowVectorXf> fill(refinement.fill.data(), static_cast<Eigen::Index>(k));
-  const FloatRows base = (fill * cases.weights.transpose()).replicate(values.rows(), 1);
-  const FloatRows weights = Permuted(cases.weights, refinement.order);
-  values = Permuted(values, refinement.order);
-  FloatRows whole = base;
-  whole.noalias() += values * weights.transpose();
-  TESSERA_RETURN_IF_ERROR(context.CheckStop());
-  FloatRows value = base;
-  uint32_t begin = 0;
-  double last = INFINITY;
-  for (const uint32_t end : PrefixEnds(k)) {
-    const Eigen::Index columns = end - begin;
-    value.noalias() += values.middleCols(begin, columns) * weights.middleCols(begin, columns).transpose();
-    begin = end;
-    const double rmse = end == k ? 0.0 : RmseOf(value, whole);
-    TESSERA_RETURN_IF_ERROR(context.CheckStop());
-    if (rmse < last || end == k) {
-      refinement.ends.push_back(end);
-      refinement.rmse.push_back(rmse);
-      last = rmse;
+  cut.order.resize(k);
+  std::iota(cut.order.begin(), cut.order.end(), 0U);
+  std::ranges::stable_sort(cut.order, [&](uint32_t a, uint32_t b) { return energy[a] > energy[b]; });
+  const auto rmse_of = [&](uint32_t end) {
+    FloatRows prefix = values;
+    for (size_t i = end; i < k; ++i) {
+      prefix.col(cut.order[i]).setConstant(fill[cut.order[i]]);
     }
+    return RmseOf(prefix * cases.weights.transpose(), whole);
+  };
+  if (k <= kMostComponents) {
+    for (const uint32_t end : GrowingEnds(k)) {
+      TESSERA_RETURN_IF_ERROR(context.CheckStop());
+      const double rmse = end == k ? 0.0 : rmse_of(end);
+      // One that would not lower the error is joined with the next.
+      if (refinement.rmse.empty() || rmse < refinement.rmse.back() || end == k) {
+        cut.ends.push_back(end);
+        refinement.rmse.push_back(rmse);
+      }
+    }
+    return refinement;
   }
+  cut.ends = EndsAroundLayers(table);
+  refinement.rmse.push_back(rmse_of(cut.ends[0]));
+  TESSERA_RETURN_IF_ERROR(context.CheckStop());
+  TESSERA_ASSIGN_OR_RETURN(SetLayers layers, MakeSetLayers(table,
+                                                           {.block_side = 1,
+                                                            .exact = std::span(cut.order).first(cut.ends[0]),
+                                                            .rmse = refinement.rmse.back(),
+                                                            .light = options.light},
+                                                           context));
+  cut.layers = layers.layers->layers.empty() ? nullptr : std::move(layers.layers);
+  refinement.rmse.insert(refinement.rmse.end(), layers.rmse.begin(), layers.rmse.end());
+  refinement.rmse.insert(refinement.rmse.end(), cut.ends.size() - 1, refinement.rmse.back());
+  refinement.rmse.back() = 0.0;
   return refinement;
 }
 

@@ -1,42 +1,52 @@
-// In which order the coefficients of a tile set are worth sending, and how far a prefix of them is from the
+// In which parts a tile set, or a level of one, is worth sending, and how far each prefix of them is from the
 // whole.
 //
-// A coefficient that is left out has its mean over the texels (0 where its meaning depends on a codec's
-// tables). Its energy is the sum over directions of its weight^2, times its variance about that value over
-// the texels: what leaving it out alone costs in reflectance. Prefixes grow by about 1.4 times; one that
-// would not lower the error is joined with the next, so that errors fall strictly or are 0.
+//   a tile set   first the coefficients that matter most, as they are, so few that they can be drawn at once;
+//   then all others in
+//                layers (set_layers.h); then those as they are. Of no more coefficients than layers would
+//                have components, more and more of them, as they are
+//   a level      layers alone
 //
-// Errors are RMSE over RGB in reflectance, clamped at 0, against all coefficients, of texels spread evenly
-// over the tiles, each in its own frame, over the cases of scene_cases.h.
+// A coefficient's energy is the sum over cases of its weight^2, times its variance about its fill over the
+// BTFels: what leaving it out alone costs in reflectance.
 //
-//   TESSERA_ASSIGN_OR_RETURN(Refinement refinement, MakeRefinement(tile_set, SceneLight::kPoint, context));
+//   TESSERA_ASSIGN_OR_RETURN(Refinement refinement, MakeRefinement(tile_set.btfels, {}, context));
+//   refinement.cut.tiles = ..;
 #pragma once
 
-#include <cstdint>
 #include <string>
 #include <vector>
 
 #include <absl/status/statusor.h>
 
 #include "btf/base/run_context.h"
+#include "btf/codec/btfel_table.h"
 #include "btf/codec/scene_light.h"
-#include "btf/wang/tile_set.h"
+#include "btf/wang/tile_set_parts.h"
 
 namespace tessera {
 
-inline constexpr int kRefineTexels = 1024;
+// Exact coefficients come in parts of about so many bytes before they are compressed.
+inline constexpr size_t kExactPartBytes = size_t{4} << 20;
 
-struct Refinement {
-  std::vector<uint32_t> order;  // [k], by falling energy, ties by index
-  std::vector<float> fill;      // [k]
-  std::vector<uint32_t> ends;   // of the prefixes, ascending up to k
-  std::vector<double> rmse;     // of each prefix; 0 at the last
-  std::string directions;       // what the errors are over, in words
+struct RefinementOptions {
+  // Of a level, the side of its tiles: its BTFels are its texels (level_set.h). 0: a tile set.
+  int level_tile_size = 0;
+  SceneLight light = SceneLight::kPoint;
 };
 
-// Same tile set, same result. Cost: kRefineTexels times 2 kRefineViews times k products. Errors:
-// INVALID_ARGUMENT when texels name BTFels that do not exist; MakeDecoder's; CANCELLED.
-[[nodiscard]] absl::StatusOr<Refinement> MakeRefinement(const TileSet& tile_set, SceneLight light,
+struct Refinement {
+  TileSetCut cut;  // of all tiles
+  // Of each prefix, RMSE over RGB in reflectance, clamped at 0, against all coefficients, of BTFels spread
+  // evenly over the table, each in its own frame, over the cases of scene_cases.h. Never rises; 0 at the last
+  // part of a tile set.
+  std::vector<double> rmse;
+  std::string directions;  // the cases, in words
+};
+
+// Same arguments, same result. Errors: MakeDecoder's; those of MakeSetLayers; CANCELLED.
+[[nodiscard]] absl::StatusOr<Refinement> MakeRefinement(const BtfelTable& table,
+                                                        const RefinementOptions& options,
                                                         const RunContext& context);
 
 }  // namespace tessera

@@ -112,16 +112,10 @@ SceneCases MakeSceneCases(const Decoder& decoder, const BtfelTable& table, Scene
   return {cases.matrix(), absl::StrCat(num_views, " measured views in 5 soft lights")};
 }
 
-absl::StatusOr<FloatRows> CoefficientsOf(const TileSet& tile_set, const std::vector<size_t>& texels) {
-  const BtfelTable& table = tile_set.btfels;
-  FloatRows values(texels.size(), table.num_coefficients);
-  for (size_t row = 0; row < texels.size(); ++row) {
-    const uint32_t btfel = BtfelOfTexel(tile_set.tile_index[texels[row]]);
-    if (btfel >= table.size()) {
-      return absl::InvalidArgumentError(
-          absl::StrCat("texel ", texels[row], " names BTFel ", btfel, " of ", table.size()));
-    }
-    const auto codes = table.btfel(btfel);
+FloatRows CoefficientsOf(const BtfelTable& table, const std::vector<size_t>& btfels) {
+  FloatRows values(static_cast<Eigen::Index>(btfels.size()), table.num_coefficients);
+  for (size_t row = 0; row < btfels.size(); ++row) {
+    const auto codes = table.btfel(btfels[row]);
     for (size_t i = 0; i < codes.size(); ++i) {
       values(static_cast<Eigen::Index>(row), static_cast<Eigen::Index>(i)) =
           table.offset[i] + table.step[i] * static_cast<float>(codes[i]);

@@ -5,16 +5,16 @@
 #include <string>
 #include <vector>
 
-#include <absl/status/statusor.h>
-
+#include "btf/codec/btfel_table.h"
 #include "btf/codec/decoder.h"
 #include "btf/codec/scene_light.h"
-#include "btf/wang/tile_set.h"
 #include "btf/wang/tile_set_layers.h"
 
 namespace tessera {
 
 inline constexpr int kRefineViews = 96;
+// BTFels over which errors are measured.
+inline constexpr size_t kRefineBtfels = 1024;
 inline constexpr int kRefineLights = 2;
 
 // values * weights^T is what texels with these coefficients [texels][k] reflect, before it is clamped at 0.
@@ -33,10 +33,8 @@ struct SceneCases {
 // At most `most` of the numbers below `count`, evenly spread, ascending.
 [[nodiscard]] std::vector<size_t> Spread(size_t count, size_t most);
 
-// [texels][k] of these texels of the tile set. Errors: INVALID_ARGUMENT when one names a BTFel that does not
-// exist.
-[[nodiscard]] absl::StatusOr<FloatRows> CoefficientsOf(const TileSet& tile_set,
-                                                       const std::vector<size_t>& texels);
+// [btfels][k] of these BTFels of the table.
+[[nodiscard]] FloatRows CoefficientsOf(const BtfelTable& table, const std::vector<size_t>& btfels);
 
 // RMSE of what texels reflect, both clamped at 0.
 [[nodiscard]] double RmseOf(const FloatRows& values, const FloatRows& whole);

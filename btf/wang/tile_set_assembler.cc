@@ -25,8 +25,9 @@ namespace {
 
 constexpr char kPartKey[] = "part";
 constexpr int kMostTexelsOfSide = 4096;
-// Of tiles that come in layers: their transforms take time with the cube of it.
-constexpr int kMostLayeredTexelsOfSide = 512;
+// Transforms take time with the cube of it.
+constexpr int kMostBlockSide = 512;
+constexpr float kMostValue = 1e30F;
 constexpr int kMostParts = 1 << 20;
 constexpr int64_t kMostCoefficients = int64_t{1} << 20;
 
@@ -107,39 +108,6 @@ absl::StatusOr<CodecTable> EmptyTable(const std::string& name, const nlohmann::j
   return refused("dtype is none of u8, u16 and f32");
 }
 
-// All BTFels with what the layers say, with the range of values that each coefficient has.
-absl::Status QuantizeLayers(const LayerSum& sum, BtfelTable& table) {
-  constexpr size_t kBlock = 1024;
-  const auto k = static_cast<size_t>(table.num_coefficients);
-  const auto for_blocks = [&](const auto& body) {
-    for (size_t begin = 0; begin < sum.num_texels(); begin += kBlock) {
-      std::vector<uint32_t> texels(std::min(kBlock, sum.num_texels() - begin));
-      std::iota(texels.begin(), texels.end(), static_cast<uint32_t>(begin));
-      body(begin, sum.Coefficients(texels));
-    }
-  };
-  Eigen::RowVectorXf low = Eigen::RowVectorXf::Constant(table.num_coefficients, INFINITY);
-  Eigen::RowVectorXf high = -low;
-  bool is_finite = true;
-  for_blocks([&](size_t, const FloatRows& values) {
-    is_finite = is_finite && values.allFinite();
-    low = low.cwiseMin(values.colwise().minCoeff());
-    high = high.cwiseMax(values.colwise().maxCoeff());
-  });
-  if (!is_finite) {
-    return absl::InvalidArgumentError("layers: a coefficient is not finite");
-  }
-  Quantisation quantisation = UniformQuantisation(std::span(low.data(), k), std::span(high.data(), k));
-  table.codes.assign(sum.num_texels() * k, 0);
-  for_blocks([&](size_t begin, const FloatRows& values) {
-    const auto count = static_cast<size_t>(values.size());
-    Quantize(quantisation, std::span(values.data(), count), std::span(table.codes).subspan(begin * k, count));
-  });
-  table.offset = std::move(quantisation.offset);
-  table.step = std::move(quantisation.step);
-  return absl::OkStatus();
-}
-
 }  // namespace
 
 absl::StatusOr<TileSetAssembler> TileSetAssembler::Begin(std::span<const std::byte> part) {
@@ -155,7 +123,7 @@ absl::StatusOr<TileSetAssembler> TileSetAssembler::Begin(std::span<const std::by
   TESSERA_RETURN_IF_ERROR(assembler.ReadHead(container));
   TESSERA_RETURN_IF_ERROR(assembler.AddPart(container));
   // Whoever saves or draws the set meets the checks of every tile set here.
-  TESSERA_RETURN_IF_ERROR(CheckTileSet(assembler.tile_set_));
+  TESSERA_RETURN_IF_ERROR(CheckTileSet(assembler.tile_set()));
   return assembler;
 }
 
@@ -188,6 +156,7 @@ absl::Status TileSetAssembler::ReadTables(const nlohmann::json& header, const Co
   }
   table.num_coefficients = static_cast<int>(table.offset.size());
   table.step.assign(table.offset.size(), 0.0F);
+  is_held_.assign(table.offset.size(), false);
   TESSERA_ASSIGN_OR_RETURN(table.views, ReadDirections("views", container));
   TESSERA_ASSIGN_OR_RETURN(table.lights, ReadDirections("lights", container));
   TESSERA_ASSIGN_OR_RETURN(const nlohmann::json tables, ReadObject(codec, "tables"));
@@ -270,25 +239,29 @@ absl::Status TileSetAssembler::ReadTiles(const Container& container) {
   if (labels_are == kPixelLabels) {
     tile_set_.source_pixels = std::move(labels);
   }
-  if (container.Find("scale") == nullptr) {
-    tile_set_.btfels.codes.assign(num_btfels_ * k, 0);
-    return absl::OkStatus();
-  }
-  if (w > kMostLayeredTexelsOfSide || num_btfels_ != num_tiles * texels) {
-    return absl::InvalidArgumentError(absl::StrCat("section 'tile_index': ", num_btfels_, " BTFels in ",
-                                                   num_tiles, " tiles of ", w, "x", w,
-                                                   " texels, expected one for each texel of at most ",
-                                                   kMostLayeredTexelsOfSide, "x", kMostLayeredTexelsOfSide));
-  }
-  TESSERA_ASSIGN_OR_RETURN(std::vector<float> scale, ReadFinite(container, "scale", k));
-  layers_.emplace(static_cast<int>(w), num_tiles, tile_set_.btfels.offset, std::move(scale));
+  tile_set_.btfels.codes.assign(num_btfels_ * k, 0);
   return absl::OkStatus();
 }
 
-absl::Status TileSetAssembler::CheckNew(std::span<const uint32_t> coefficients) const {
+absl::Status TileSetAssembler::BeginLayers(const Container& container) {
+  const auto k = static_cast<size_t>(tile_set_.btfels.num_coefficients);
+  TESSERA_ASSIGN_OR_RETURN(const int side, ReadInteger(container.header, "block_side", 1, kMostBlockSide));
+  const auto block = static_cast<size_t>(side) * static_cast<size_t>(side);
+  if (num_btfels_ % block != 0) {
+    return absl::InvalidArgumentError(absl::StrCat("header: block_side ", side, ", but ", num_btfels_,
+                                                   " BTFels are not whole blocks of ", block));
+  }
+  TESSERA_ASSIGN_OR_RETURN(std::vector<float> mean, ReadFinite(container, "mean", k));
+  TESSERA_ASSIGN_OR_RETURN(std::vector<float> scale, ReadFinite(container, "scale", k));
+  layers_.emplace(side, num_btfels_ / block, std::move(mean), std::move(scale));
+  return absl::OkStatus();
+}
+
+absl::Status TileSetAssembler::CheckNew(std::span<const uint32_t> coefficients,
+                                        std::span<const uint32_t> before) const {
   const auto k = static_cast<size_t>(tile_set_.btfels.num_coefficients);
   std::vector<bool> taken(k, false);
-  for (const uint32_t coefficient : held_) {
+  for (const uint32_t coefficient : before) {
     taken[coefficient] = true;
   }
   for (const uint32_t coefficient : coefficients) {
@@ -302,7 +275,12 @@ absl::Status TileSetAssembler::CheckNew(std::span<const uint32_t> coefficients) 
 }
 
 absl::Status TileSetAssembler::AddPart(const Container& container) {
-  TESSERA_RETURN_IF_ERROR(layers_.has_value() ? AddLayer(container) : AddColumns(container));
+  if (container.Find("layer_step") != nullptr) {
+    TESSERA_RETURN_IF_ERROR(AddLayer(container));
+  } else {
+    Quantize();
+    TESSERA_RETURN_IF_ERROR(AddColumns(container));
+  }
   ++num_parts_;
   Record();
   return absl::OkStatus();
@@ -324,7 +302,7 @@ absl::Status TileSetAssembler::AddColumns(const Container& container) {
   const auto k = static_cast<size_t>(tile_set_.btfels.num_coefficients);
   TESSERA_ASSIGN_OR_RETURN(const std::vector<uint32_t> columns,
                            ReadVector<uint32_t>(container, "coefficients"));
-  TESSERA_RETURN_IF_ERROR(CheckNew(columns));
+  TESSERA_RETURN_IF_ERROR(CheckNew(columns, exact_));
   TESSERA_ASSIGN_OR_RETURN(const std::vector<float> offset, ReadFinite(container, "offset", columns.size()));
   TESSERA_ASSIGN_OR_RETURN(const std::vector<float> step, ReadFinite(container, "step", columns.size()));
   if (columns.empty() || std::ranges::any_of(step, [](float s) { return s < 0.0F; })) {
@@ -351,22 +329,90 @@ absl::Status TileSetAssembler::AddColumns(const Container& container) {
       to[coefficient] = static_cast<uint8_t>(*from++);
     }
   }
-  held_.insert(held_.end(), columns.begin(), columns.end());
+  exact_.insert(exact_.end(), columns.begin(), columns.end());
+  Hold(columns);
   return absl::OkStatus();
 }
 
+void TileSetAssembler::Hold(std::span<const uint32_t> coefficients) {
+  for (const uint32_t coefficient : coefficients) {
+    if (!is_held_[coefficient]) {
+      is_held_[coefficient] = true;
+      held_.push_back(coefficient);
+    }
+  }
+}
+
 absl::Status TileSetAssembler::AddLayer(const Container& container) {
+  const bool is_first = !layers_.has_value();
+  if (is_first) {
+    TESSERA_RETURN_IF_ERROR(BeginLayers(container));
+  }
+  const absl::Status added = SumLayer(container);
+  if (!added.ok() && is_first) {
+    layers_.reset();
+  }
+  return added;
+}
+
+absl::Status TileSetAssembler::SumLayer(const Container& container) {
   TESSERA_ASSIGN_OR_RETURN(const TileSetLayer layer, ReadLayerSections(container, *layers_));
-  TESSERA_RETURN_IF_ERROR(CheckNew(layer.coefficients));
+  TESSERA_RETURN_IF_ERROR(CheckNew(layer.coefficients, held_));
   TESSERA_ASSIGN_OR_RETURN(BtfelTable shared, TablesWith(layer.coefficients, container));
   LayerSum sum = *layers_;
   TESSERA_RETURN_IF_ERROR(sum.Add(layer));
-  TESSERA_RETURN_IF_ERROR(QuantizeLayers(sum, shared));
+  if (!(sum.Bound() <= kMostValue)) {
+    return absl::InvalidArgumentError(
+        absl::StrCat("layers: coefficients up to ", sum.Bound(), ", at most ", kMostValue));
+  }
   TESSERA_RETURN_IF_ERROR(MakeDecoder(shared).status());
+  shared.codes = std::move(tile_set_.btfels.codes);
   tile_set_.btfels = std::move(shared);
   layers_ = std::move(sum);
-  held_.insert(held_.end(), layer.coefficients.begin(), layer.coefficients.end());
+  is_stale_ = true;
+  Hold(layer.coefficients);
   return absl::OkStatus();
+}
+
+void TileSetAssembler::Quantize() {
+  constexpr size_t kRows = 128;  // their values stay in the processor's cache
+  if (!is_stale_) {
+    return;
+  }
+  is_stale_ = false;
+  BtfelTable& table = tile_set_.btfels;
+  const auto k = static_cast<size_t>(table.num_coefficients);
+  const auto for_rows = [&](const auto& body) {
+    for (size_t begin = 0; begin < num_btfels_; begin += kRows) {
+      std::vector<uint32_t> btfels(std::min(kRows, num_btfels_ - begin));
+      std::iota(btfels.begin(), btfels.end(), static_cast<uint32_t>(begin));
+      body(begin, layers_->Coefficients(btfels));
+    }
+  };
+  Eigen::RowVectorXf low = Eigen::RowVectorXf::Constant(table.num_coefficients, INFINITY);
+  Eigen::RowVectorXf high = -low;
+  for_rows([&](size_t, const FloatRows& values) {
+    low = low.cwiseMin(values.colwise().minCoeff());
+    high = high.cwiseMax(values.colwise().maxCoeff());
+  });
+  Quantisation quantisation = UniformQuantisation(std::span(low.data(), k), std::span(high.data(), k));
+  std::vector<uint8_t> codes(kRows * k);
+  std::vector<bool> is_exact(k, false);
+  for (const uint32_t coefficient : exact_) {
+    is_exact[coefficient] = true;
+    quantisation.offset[coefficient] = table.offset[coefficient];
+    quantisation.step[coefficient] = table.step[coefficient];
+  }
+  for_rows([&](size_t begin, const FloatRows& values) {
+    const auto count = static_cast<size_t>(values.size());
+    tessera::Quantize(quantisation, std::span(values.data(), count), std::span(codes).first(count));
+    uint8_t* const to = table.codes.data() + begin * k;
+    for (size_t i = 0; i < count; ++i) {
+      to[i] = is_exact[i % k] ? to[i] : codes[i];
+    }
+  });
+  table.offset = std::move(quantisation.offset);
+  table.step = std::move(quantisation.step);
 }
 
 absl::Status TileSetAssembler::Add(std::span<const std::byte> part) {

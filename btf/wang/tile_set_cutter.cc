@@ -27,6 +27,7 @@ absl::Status CheckTiles(const TileSet& tile_set, const TileSetCut& cut) {
 }
 
 absl::Status CheckColumns(const TileSetCut& cut, const CoefficientTables& tables, size_t k) {
+  const size_t ordered = cut.layers != nullptr && cut.ends.empty() ? 0 : k;
   std::vector<bool> seen(k, false);
   for (const uint32_t coefficient : cut.order) {
     if (coefficient >= k || seen[coefficient]) {
@@ -36,8 +37,8 @@ absl::Status CheckColumns(const TileSetCut& cut, const CoefficientTables& tables
     seen[coefficient] = true;
   }
   const bool ascending = std::ranges::adjacent_find(cut.ends, std::greater_equal()) == cut.ends.end();
-  if (k == 0 || cut.order.size() != k || cut.fill.size() != k || cut.ends.empty() || !ascending ||
-      cut.ends.front() == 0 || cut.ends.back() != k) {
+  if (k == 0 || cut.order.size() != ordered || cut.fill.size() != k || !ascending ||
+      (ordered > 0 && (cut.ends.empty() || cut.ends.front() == 0 || cut.ends.back() != k))) {
     return absl::InvalidArgumentError(absl::StrCat("order of ", cut.order.size(), ", fill of ",
                                                    cut.fill.size(), ", parts of ",
                                                    cut.ends.empty() ? 0 : cut.ends.back(), ", expected ", k));
@@ -52,21 +53,32 @@ absl::Status CheckColumns(const TileSetCut& cut, const CoefficientTables& tables
 }
 
 // Whether the layers can be added up.
-absl::Status CheckLayers(const TileSetLayers& layers, const TileSet& tile_set, size_t k) {
-  if (k == 0 || layers.mean.size() != k || layers.scale.size() != k || layers.layers.empty()) {
-    return absl::InvalidArgumentError(absl::StrCat(layers.layers.size(), " layers, mean of ",
-                                                   layers.mean.size(), ", scale of ", layers.scale.size(),
-                                                   ", expected ", k));
+absl::Status CheckLayers(const TileSetCut& cut, const TileSet& tile_set, size_t k) {
+  const TileSetLayers& layers = *cut.layers;
+  const size_t block = static_cast<size_t>(std::max(layers.block_side, 0)) *
+                       static_cast<size_t>(std::max(layers.block_side, 0));
+  if (layers.mean.size() != k || layers.scale.size() != k || layers.layers.empty() || block == 0 ||
+      tile_set.btfels.size() % block != 0) {
+    return absl::InvalidArgumentError(absl::StrCat(
+        layers.layers.size(), " layers, mean of ", layers.mean.size(), ", scale of ", layers.scale.size(),
+        ", expected ", k, ", blocks of ", block, " of ", tile_set.btfels.size(), " BTFels"));
   }
   for (const auto& [name, table] : layers.tables) {
     const auto of_set = tile_set.btfels.tables.find(name);
     if (of_set == tile_set.btfels.tables.end() || of_set->second.dtype != table.dtype ||
-        of_set->second.values.size() != table.values.size()) {
-      return absl::InvalidArgumentError(absl::StrCat("layers: table '", name, "' is not the tile set's"));
+        of_set->second.values.size() != table.values.size() || !cut.ends.empty()) {
+      return absl::InvalidArgumentError(
+          absl::StrCat("layers: table '", name, "' is not the tile set's, or exact coefficients follow"));
     }
   }
-  LayerSum sum(tile_set.tile_size, tile_set.tile_codes.size(), layers.mean, layers.scale);
+  LayerSum sum(layers.block_side, tile_set.btfels.size() / block, layers.mean, layers.scale);
   for (const TileSetLayer& layer : layers.layers) {
+    for (size_t i = 0; i < (cut.ends.empty() ? 0 : cut.ends[0]); ++i) {
+      if (std::ranges::find(layer.coefficients, cut.order[i]) != layer.coefficients.end()) {
+        return absl::InvalidArgumentError(
+            absl::StrCat("layers: coefficient ", cut.order[i], " is exact before they come"));
+      }
+    }
     TESSERA_RETURN_IF_ERROR(sum.Add(layer));
   }
   return absl::OkStatus();
@@ -123,33 +135,53 @@ absl::StatusOr<TileSetCutter> TileSetCutter::Create(const TileSet& tile_set, Til
     }
   }
   const auto k = static_cast<size_t>(std::max(tile_set.btfels.num_coefficients, 0));
-  TESSERA_RETURN_IF_ERROR(cut.layers == nullptr ? CheckColumns(cut, tables, k)
-                                                : CheckLayers(*cut.layers, tile_set, k));
+  TESSERA_RETURN_IF_ERROR(CheckColumns(cut, tables, k));
+  if (cut.layers != nullptr) {
+    TESSERA_RETURN_IF_ERROR(CheckLayers(cut, tile_set, k));
+  }
   TileSetCutter cutter(tile_set, std::move(cut), std::move(tables));
   cutter.FindBtfels();
+  TESSERA_RETURN_IF_ERROR(cutter.FindBlocks());
   return cutter;
 }
 
-size_t TileSetCutter::num_tiles() const {
-  return cut_.tiles.empty() ? tile_set_->tile_codes.size() : cut_.tiles.size();
+TileSetCutter::Piece TileSetCutter::PieceOf(size_t part) const {
+  const size_t before = std::min<size_t>(cut_.ends.size(), 1);  // prefixes before the layers
+  if (part < before) {
+    return {.is_layer = false, .index = part};
+  }
+  return part - before < num_layers() ? Piece{.is_layer = true, .index = part - before}
+                                      : Piece{.is_layer = false, .index = part - num_layers()};
+}
+
+std::vector<uint32_t> TileSetCutter::CoefficientsOf(const Piece& piece) const {
+  if (piece.is_layer) {
+    return cut_.layers->layers[piece.index].coefficients;
+  }
+  const size_t begin = piece.index == 0 ? 0 : cut_.ends[piece.index - 1];
+  return {cut_.order.begin() + static_cast<std::ptrdiff_t>(begin),
+          cut_.order.begin() + static_cast<std::ptrdiff_t>(cut_.ends[piece.index])};
+}
+
+std::vector<uint32_t> TileSetCutter::CoefficientsBefore(size_t part) const {
+  std::vector<bool> held(cut_.fill.size(), false);
+  std::vector<uint32_t> before;
+  for (size_t i = 0; i < part; ++i) {
+    for (const uint32_t coefficient : CoefficientsOf(PieceOf(i))) {
+      if (!held[coefficient]) {
+        held[coefficient] = true;
+        before.push_back(coefficient);
+      }
+    }
+  }
+  return before;
 }
 
 size_t TileSetCutter::num_coefficients(size_t part) const {
-  if (cut_.layers == nullptr) {
-    return cut_.ends[part];
-  }
-  size_t count = 0;
-  for (size_t i = 0; i <= part; ++i) {
-    count += cut_.layers->layers[i].coefficients.size();
-  }
-  return count;
+  return CoefficientsBefore(part + 1).size();
 }
 
 void TileSetCutter::FindBtfels() {
-  if (cut_.layers != nullptr) {
-    num_btfels_ = num_tiles() * static_cast<size_t>(tile_set_->tile_size) * tile_set_->tile_size;
-    return;
-  }
   std::vector<bool> used(tile_set_->btfels.size(), false);
   ForTiles(cut_.tiles, tile_set_->tile_codes.size(), [&](size_t tile) {
     const size_t texels = static_cast<size_t>(tile_set_->tile_size) * tile_set_->tile_size;
@@ -162,13 +194,31 @@ void TileSetCutter::FindBtfels() {
       btfels_.push_back(static_cast<uint32_t>(btfel));
     }
   }
-  num_btfels_ = btfels_.size();
+}
+
+absl::Status TileSetCutter::FindBlocks() {
+  if (cut_.layers == nullptr) {
+    return absl::OkStatus();
+  }
+  const auto block = static_cast<uint32_t>(cut_.layers->block_side * cut_.layers->block_side);
+  for (size_t i = 0; i < btfels_.size(); ++i) {
+    if (btfels_[i] % block != i % block) {
+      return absl::InvalidArgumentError(
+          absl::StrCat("tiles show BTFel ", btfels_[i], " without the others of its block of ", block));
+    }
+    if (i % block == 0) {
+      blocks_.push_back(btfels_[i] / block);
+    }
+  }
+  return btfels_.size() % block == 0
+             ? absl::OkStatus()
+             : absl::InvalidArgumentError(
+                   absl::StrCat("tiles show ", btfels_.size(), " BTFels, not whole blocks of ", block));
 }
 
 bool TileSetCutter::KnowsPixels() const {
   const std::vector<uint32_t>& pixels = tile_set_->source_pixels;
-  return cut_.layers == nullptr && pixels.size() == tile_set_->btfels.size() && !pixels.empty() &&
-         pixels.back() <= kLargestLabel;
+  return pixels.size() == tile_set_->btfels.size() && !pixels.empty() && pixels.back() <= kLargestLabel;
 }
 
 std::vector<uint32_t> TileSetCutter::Labels() const {
@@ -203,15 +253,12 @@ absl::Status TileSetCutter::AddHead(Container& container) const {
 
   const auto w = static_cast<int64_t>(tile_set_->tile_size);
   const std::vector<uint32_t> labels = Labels();
-  const bool by_layers = cut_.layers != nullptr;
   std::vector<uint32_t> index;
   ForTiles(cut_.tiles, tile_set_->tile_codes.size(), [&](size_t tile) {
     std::vector<uint32_t> texels(static_cast<size_t>(w * w));
     for (size_t i = 0; i < texels.size(); ++i) {
       const uint32_t texel = tile_set_->tile_index[tile * texels.size() + i];
-      const uint32_t label =
-          by_layers ? static_cast<uint32_t>(tile * texels.size() + i) : labels[BtfelOfTexel(texel)];
-      texels[i] = PackTexel(label, TurnsOfTexel(texel));
+      texels[i] = PackTexel(labels[BtfelOfTexel(texel)], TurnsOfTexel(texel));
     }
     PredictTexels(tile_set_->tile_size, texels);
     index.insert(index.end(), texels.begin(), texels.end());
@@ -223,13 +270,8 @@ absl::Status TileSetCutter::AddHead(Container& container) const {
     container.sections.push_back(Compressed(MakeSection<uint32_t>("tiles", {num_tiles}, cut_.tiles)));
   }
   container.sections.push_back(Compressed(MakeSection<uint32_t>("tile_index", {num_tiles, w, w}, index)));
-  const auto add = [&](const char* name, std::span<const float> values) {
-    container.sections.push_back(Compressed(MakeSection<float>(name, {table.num_coefficients}, values)));
-  };
-  add("fill", by_layers ? cut_.layers->mean : cut_.fill);
-  if (by_layers) {
-    add("scale", cut_.layers->scale);
-  }
+  container.sections.push_back(
+      Compressed(MakeSection<float>("fill", {table.num_coefficients}, std::span<const float>(cut_.fill))));
   TESSERA_RETURN_IF_ERROR(AddDirections("views", table.views, container));
   TESSERA_RETURN_IF_ERROR(AddDirections("lights", table.lights, container));
   for (const auto& [name, codec_table] : table.tables) {
@@ -240,11 +282,9 @@ absl::Status TileSetCutter::AddHead(Container& container) const {
   return absl::OkStatus();
 }
 
-void TileSetCutter::AddColumns(size_t index, Container& container) const {
+void TileSetCutter::AddColumns(size_t part, Container& container) const {
   const BtfelTable& table = tile_set_->btfels;
-  const size_t begin = index == 0 ? 0 : cut_.ends[index - 1];
-  const std::span<const uint32_t> before = std::span(cut_.order).first(begin);
-  const std::span<const uint32_t> columns = std::span(cut_.order).subspan(begin, cut_.ends[index] - begin);
+  const std::vector<uint32_t> columns = CoefficientsOf(PieceOf(part));
   const auto count = static_cast<int64_t>(columns.size());
   std::vector<float> offset;
   std::vector<float> step;
@@ -252,13 +292,14 @@ void TileSetCutter::AddColumns(size_t index, Container& container) const {
     offset.push_back(table.offset[coefficient]);
     step.push_back(table.step[coefficient]);
   }
-  container.sections.push_back(Compressed(MakeSection<uint32_t>("coefficients", {count}, columns)));
+  container.sections.push_back(
+      Compressed(MakeSection<uint32_t>("coefficients", {count}, std::span<const uint32_t>(columns))));
   container.sections.push_back(
       Compressed(MakeSection<float>("offset", {count}, std::span<const float>(offset))));
   container.sections.push_back(Compressed(MakeSection<float>("step", {count}, std::span<const float>(step))));
-  AddEntries(columns, before, container);
+  AddEntries(columns, CoefficientsBefore(part), container);
   Section codes;
-  codes.name = absl::StrCat("btfels.", index);
+  codes.name = absl::StrCat("btfels.", part);
   codes.dtype = DType::kU8;
   codes.shape = {static_cast<int64_t>(btfels_.size()), count};
   codes.bytes.resize(btfels_.size() * columns.size());
@@ -285,14 +326,20 @@ void TileSetCutter::AddEntries(std::span<const uint32_t> coefficients, std::span
   }
 }
 
-void TileSetCutter::AddLayer(size_t index, Container& container) const {
-  std::vector<uint32_t> before;
-  for (size_t i = 0; i < index; ++i) {
-    const std::vector<uint32_t>& held = cut_.layers->layers[i].coefficients;
-    before.insert(before.end(), held.begin(), held.end());
+void TileSetCutter::AddLayer(size_t part, Container& container) const {
+  const TileSetLayers& layers = *cut_.layers;
+  const size_t index = PieceOf(part).index;
+  if (index == 0) {
+    container.header["block_side"] = layers.block_side;
+    const auto k = static_cast<int64_t>(layers.mean.size());
+    container.sections.push_back(
+        Compressed(MakeSection<float>("mean", {k}, std::span<const float>(layers.mean))));
+    container.sections.push_back(
+        Compressed(MakeSection<float>("scale", {k}, std::span<const float>(layers.scale))));
   }
-  AddLayerSections(*cut_.layers, index, cut_.tiles, tile_set_->tile_codes.size(), container);
-  AddEntries(cut_.layers->layers[index].coefficients, before, container);
+  const auto block = static_cast<size_t>(layers.block_side) * static_cast<size_t>(layers.block_side);
+  AddLayerSections(layers, index, blocks_, tile_set_->btfels.size() / block, container);
+  AddEntries(layers.layers[index].coefficients, CoefficientsBefore(part), container);
 }
 
 absl::StatusOr<std::string> TileSetCutter::Part(size_t index, std::string_view first_sha256) const {
@@ -305,10 +352,10 @@ absl::StatusOr<std::string> TileSetCutter::Part(size_t index, std::string_view f
   } else {
     container.header["first_sha256"] = first_sha256;
   }
-  if (cut_.layers == nullptr) {
-    AddColumns(index, container);
-  } else {
+  if (PieceOf(index).is_layer) {
     AddLayer(index, container);
+  } else {
+    AddColumns(index, container);
   }
   return SerializeContainer(std::move(container));
 }

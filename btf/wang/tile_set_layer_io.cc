@@ -71,8 +71,8 @@ absl::StatusOr<std::vector<int32_t>> ReadCodes(const Container& container, const
 
 }  // namespace
 
-void AddLayerSections(const TileSetLayers& layers, size_t index, const std::vector<uint32_t>& tiles,
-                      size_t num_tiles, Container& container) {
+void AddLayerSections(const TileSetLayers& layers, size_t index, std::span<const uint32_t> blocks,
+                      size_t num_blocks, Container& container) {
   const TileSetLayer& layer = layers.layers[index];
   const auto add = [&container]<typename T>(const char* name, const std::vector<T>& values) {
     container.sections.push_back(
@@ -89,20 +89,22 @@ void AddLayerSections(const TileSetLayers& layers, size_t index, const std::vect
   CodeWriter basis;
   std::ranges::for_each(layer.basis, [&basis](int32_t code) { basis.Write(code); });
   basis.AddSections("basis", container);
-  const size_t frequencies = components == 0 ? 0 : layer.codes.size() / components / num_tiles;
+  const size_t frequencies = components == 0 ? 0 : layer.codes.size() / components / num_blocks;
   CodeWriter codes;
   std::vector<uint32_t> reach;
   for (size_t c = 0; c < components; ++c) {
     // Behind the last code that is not 0 there is nothing to send.
     const auto component =
-        std::span(layer.codes).subspan(c * frequencies * num_tiles, frequencies * num_tiles);
+        std::span(layer.codes).subspan(c * frequencies * num_blocks, frequencies * num_blocks);
     size_t end = component.size();
     while (end > 0 && component[end - 1] == 0) {
       --end;
     }
-    reach.push_back(static_cast<uint32_t>((end + num_tiles - 1) / num_tiles));
+    reach.push_back(static_cast<uint32_t>((end + num_blocks - 1) / num_blocks));
     for (size_t f = 0; f < reach.back(); ++f) {
-      ForTiles(tiles, num_tiles, [&](size_t tile) { codes.Write(component[f * num_tiles + tile]); });
+      for (const uint32_t block : blocks) {
+        codes.Write(component[f * num_blocks + block]);
+      }
     }
   }
   add("reach", reach);
@@ -131,7 +133,7 @@ absl::StatusOr<TileSetLayer> ReadLayerSections(const Container& container, const
   TESSERA_ASSIGN_OR_RETURN(layer.basis, ReadCodes(container, "basis", basis));
   const size_t components = sum.num_components() + layer.spans.size();
   TESSERA_ASSIGN_OR_RETURN(const std::vector<uint32_t> reach, ReadVector<uint32_t>(container, "reach"));
-  const size_t frequencies = sum.num_texels() / sum.num_tiles();
+  const size_t frequencies = sum.num_btfels() / sum.num_blocks();
   const bool too_far = std::ranges::any_of(reach, [frequencies](uint32_t r) { return r > frequencies; });
   if (components > kMostLayerComponents || reach.size() != components || too_far) {
     return absl::InvalidArgumentError(absl::StrCat("section 'reach': ", reach.size(), " values, expected ",
@@ -140,19 +142,19 @@ absl::StatusOr<TileSetLayer> ReadLayerSections(const Container& container, const
   }
   size_t count = 0;
   for (const uint32_t frequency : reach) {
-    count += frequency * sum.num_tiles();
+    count += frequency * sum.num_blocks();
   }
   TESSERA_ASSIGN_OR_RETURN(const std::vector<int32_t> codes, ReadCodes(container, "codes", count));
-  if (components * sum.num_texels() > kMaxExpandedBytes / (4 * sizeof(float))) {
-    return absl::InvalidArgumentError(absl::StrCat(components, " components of ", sum.num_texels(),
-                                                   " texels take more than ", kMaxExpandedBytes, " bytes"));
+  if (components * sum.num_btfels() > kMaxExpandedBytes / (4 * sizeof(float))) {
+    return absl::InvalidArgumentError(absl::StrCat(components, " components of ", sum.num_btfels(),
+                                                   " BTFels take more than ", kMaxExpandedBytes, " bytes"));
   }
-  layer.codes.assign(components * sum.num_texels(), 0);
+  layer.codes.assign(components * sum.num_btfels(), 0);
   auto from = codes.begin();
   for (size_t c = 0; c < components; ++c) {
-    const auto texels = static_cast<std::ptrdiff_t>(reach[c] * sum.num_tiles());
-    std::copy_n(from, texels, layer.codes.begin() + static_cast<std::ptrdiff_t>(c * sum.num_texels()));
-    from += texels;
+    const auto btfels = static_cast<std::ptrdiff_t>(reach[c] * sum.num_blocks());
+    std::copy_n(from, btfels, layer.codes.begin() + static_cast<std::ptrdiff_t>(c * sum.num_btfels()));
+    from += btfels;
   }
   return layer;
 }

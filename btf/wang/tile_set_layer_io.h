@@ -3,7 +3,7 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <vector>
+#include <span>
 
 #include <absl/status/statusor.h>
 
@@ -12,11 +12,11 @@
 
 namespace tessera {
 
-// What of `layer`, the one at `index`, is about these of `num_tiles` tiles (none: all).
-void AddLayerSections(const TileSetLayers& layers, size_t index, const std::vector<uint32_t>& tiles,
-                      size_t num_tiles, Container& container);
+// Of layer `index`, with the codes of these of `num_blocks` blocks.
+void AddLayerSections(const TileSetLayers& layers, size_t index, std::span<const uint32_t> blocks,
+                      size_t num_blocks, Container& container);
 
-// The layer that follows those of `sum`, which has `num_tiles` tiles. Errors: INVALID_ARGUMENT naming the
+// The layer that follows those of `sum`. Errors: INVALID_ARGUMENT naming the
 // section.
 [[nodiscard]] absl::StatusOr<TileSetLayer> ReadLayerSections(const Container& container, const LayerSum& sum);
 

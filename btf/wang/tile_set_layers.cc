@@ -12,39 +12,74 @@
 
 namespace tessera {
 
-std::vector<TileFrequency> TileFrequencies(int tile_size) {
-  std::vector<TileFrequency> frequencies;
-  for (int v = 0; v < tile_size; ++v) {
-    for (int u = 0; u < tile_size; ++u) {
+std::vector<BlockFrequency> BlockFrequencies(int block_side) {
+  std::vector<BlockFrequency> frequencies;
+  for (int v = 0; v < block_side; ++v) {
+    for (int u = 0; u < block_side; ++u) {
       frequencies.push_back({u, v});
     }
   }
-  std::ranges::stable_sort(frequencies, [](const TileFrequency& a, const TileFrequency& b) {
+  std::ranges::stable_sort(frequencies, [](const BlockFrequency& a, const BlockFrequency& b) {
     return std::tuple(a.u + a.v, a.v) < std::tuple(b.u + b.v, b.v);
   });
   return frequencies;
 }
 
-float StepFactor(const TileFrequency& frequency, int tile_size) {
-  return 2 * std::max(frequency.u, frequency.v) >= tile_size && tile_size > 1 ? 2.0F : 1.0F;
+float StepFactor(const BlockFrequency& frequency, int block_side) {
+  return 2 * std::max(frequency.u, frequency.v) >= block_side && block_side > 1 ? 2.0F : 1.0F;
 }
 
-TileCosines::TileCosines(int tile_size) : matrix_(tile_size, tile_size) {
-  for (int u = 0; u < tile_size; ++u) {
-    const double norm = std::sqrt((u == 0 ? 1.0 : 2.0) / tile_size);
-    for (int x = 0; x < tile_size; ++x) {
-      matrix_(u, x) = static_cast<float>(norm * std::cos(kPi * (2 * x + 1) * u / (2 * tile_size)));
+BlockCosines::BlockCosines(int block_side)
+    : matrix_(block_side, block_side), frequencies_(BlockFrequencies(block_side)) {
+  for (int u = 0; u < block_side; ++u) {
+    const double norm = std::sqrt((u == 0 ? 1.0 : 2.0) / block_side);
+    for (int x = 0; x < block_side; ++x) {
+      matrix_(u, x) = static_cast<float>(norm * std::cos(kPi * (2 * x + 1) * u / (2 * block_side)));
     }
   }
 }
 
-LayerSum::LayerSum(int tile_size, size_t num_tiles, std::vector<float> mean, std::vector<float> scale)
-    : tile_size_(tile_size),
-      num_tiles_(num_tiles),
+std::vector<float> BlockCosines::Forward(std::span<const float> image) const {
+  std::vector<float> cosines(image.begin(), image.end());
+  if (frequencies_.size() == 1) {
+    return cosines;
+  }
+  const size_t num_blocks = image.size() / frequencies_.size();
+  for (size_t block = 0; block < num_blocks; ++block) {
+    const Eigen::Map<const FloatRows> from(image.data() + block * frequencies_.size(), matrix_.rows(),
+                                           matrix_.cols());
+    const FloatRows transformed = matrix_ * from * matrix_.transpose();
+    for (size_t f = 0; f < frequencies_.size(); ++f) {
+      cosines[f * num_blocks + block] = transformed(frequencies_[f].v, frequencies_[f].u);
+    }
+  }
+  return cosines;
+}
+
+std::vector<float> BlockCosines::Back(std::span<const float> cosines) const {
+  std::vector<float> image(cosines.begin(), cosines.end());
+  if (frequencies_.size() == 1) {
+    return image;
+  }
+  const size_t num_blocks = cosines.size() / frequencies_.size();
+  FloatRows from(matrix_.rows(), matrix_.cols());
+  for (size_t block = 0; block < num_blocks; ++block) {
+    for (size_t f = 0; f < frequencies_.size(); ++f) {
+      from(frequencies_[f].v, frequencies_[f].u) = cosines[f * num_blocks + block];
+    }
+    Eigen::Map<FloatRows>(image.data() + block * frequencies_.size(), matrix_.rows(), matrix_.cols()) =
+        matrix_.transpose() * from * matrix_;
+  }
+  return image;
+}
+
+LayerSum::LayerSum(int block_side, size_t num_blocks, std::vector<float> mean, std::vector<float> scale)
+    : block_side_(block_side),
+      num_blocks_(num_blocks),
       mean_(std::move(mean)),
       scale_(std::move(scale)),
-      frequencies_(TileFrequencies(tile_size)),
-      transform_(tile_size) {}
+      frequencies_(BlockFrequencies(block_side)),
+      transform_(block_side) {}
 
 absl::Status LayerSum::Check(const TileSetLayer& layer) const {
   if (!std::isfinite(layer.step) || layer.step <= 0.0F) {
@@ -82,10 +117,10 @@ absl::Status LayerSum::Check(const TileSetLayer& layer) const {
                                                    " values, expected ", layer.spans.size(),
                                                    " finite ones from 0"));
   }
-  if (layer.basis.size() != basis || layer.codes.size() != components * num_texels()) {
+  if (layer.basis.size() != basis || layer.codes.size() != components * num_btfels()) {
     return absl::InvalidArgumentError(absl::StrCat("layer's basis: ", layer.basis.size(), " of ", basis,
                                                    " codes, images: ", layer.codes.size(), " of ",
-                                                   components * num_texels()));
+                                                   components * num_btfels()));
   }
   return absl::OkStatus();
 }
@@ -101,53 +136,57 @@ absl::Status LayerSum::Add(const TileSetLayer& layer) {
     }
     spans_.push_back(layer.spans[i]);
     basis_.push_back(std::move(basis));
-    cosines_.emplace_back(num_texels(), 0.0F);
-    images_.emplace_back(num_texels(), 0.0F);
+    cosines_.emplace_back(num_btfels(), 0.0F);
+    images_.emplace_back(num_btfels(), 0.0F);
   }
   auto from = layer.codes.begin();
   for (size_t c = 0; c < spans_.size(); ++c) {
     for (size_t f = 0; f < frequencies_.size(); ++f) {
-      const float step = layer.step * StepFactor(frequencies_[f], tile_size_);
-      for (size_t tile = 0; tile < num_tiles_; ++tile) {
-        cosines_[c][f * num_tiles_ + tile] += step * static_cast<float>(*from++);
+      const float step = layer.step * StepFactor(frequencies_[f], block_side_);
+      for (size_t block = 0; block < num_blocks_; ++block) {
+        cosines_[c][f * num_blocks_ + block] += step * static_cast<float>(*from++);
       }
     }
-    FloatRows cosines(tile_size_, tile_size_);
-    for (size_t tile = 0; tile < num_tiles_; ++tile) {
-      for (size_t f = 0; f < frequencies_.size(); ++f) {
-        cosines(frequencies_[f].v, frequencies_[f].u) = cosines_[c][f * num_tiles_ + tile];
-      }
-      Eigen::Map<FloatRows>(images_[c].data() + tile * frequencies_.size(), tile_size_, tile_size_) =
-          transform_.Back(cosines);
-    }
+    images_[c] = transform_.Back(cosines_[c]);
   }
   return absl::OkStatus();
 }
 
-FloatRows LayerSum::Coefficients(std::span<const uint32_t> texels) const {
-  const auto rows = static_cast<Eigen::Index>(texels.size());
-  FloatRows values =
-      Eigen::Map<const Eigen::RowVectorXf>(mean_.data(), static_cast<Eigen::Index>(mean_.size()))
-          .replicate(rows, 1);
-  for (size_t layer = 0; layer < coefficients_.size(); ++layer) {
-    const std::vector<uint32_t>& columns = coefficients_[layer];
-    const auto count = std::ranges::count(spans_, static_cast<uint32_t>(layer));
-    FloatRows images(rows, count);
-    FloatRows basis(count, static_cast<Eigen::Index>(columns.size()));
-    Eigen::Index to = 0;
-    for (size_t c = 0; c < spans_.size(); ++c) {
-      if (spans_[c] == layer) {
-        for (Eigen::Index row = 0; row < rows; ++row) {
-          images(row, to) = images_[c][texels[static_cast<size_t>(row)]];
-        }
-        basis.row(to++) = Eigen::Map<const Eigen::RowVectorXf>(basis_[c].data(), basis.cols());
+float LayerSum::Bound() const {
+  const auto largest = [](const std::vector<float>& values) {
+    float most = 0.0F;
+    for (const float value : values) {
+      most = std::isfinite(value) ? std::max(most, std::abs(value)) : INFINITY;
+      if (!std::isfinite(most)) {
+        break;
       }
     }
-    const FloatRows added = images * basis;
+    return most;
+  };
+  float bound = largest(mean_);
+  for (size_t c = 0; c < spans_.size(); ++c) {
+    bound += largest(images_[c]) * largest(basis_[c]);
+  }
+  return bound;
+}
+
+FloatRows LayerSum::Coefficients(std::span<const uint32_t> btfels) const {
+  const auto rows = static_cast<Eigen::Index>(btfels.size());
+  const auto k = static_cast<Eigen::Index>(mean_.size());
+  FloatRows images(rows, static_cast<Eigen::Index>(spans_.size()));
+  FloatRows basis = FloatRows::Zero(images.cols(), k);
+  for (size_t c = 0; c < spans_.size(); ++c) {
+    const auto component = static_cast<Eigen::Index>(c);
+    for (size_t i = 0; i < btfels.size(); ++i) {
+      images(static_cast<Eigen::Index>(i), component) = images_[c][btfels[i]];
+    }
+    const std::vector<uint32_t>& columns = coefficients_[spans_[c]];
     for (size_t i = 0; i < columns.size(); ++i) {
-      values.col(columns[i]) += added.col(static_cast<Eigen::Index>(i));
+      basis(component, columns[i]) = basis_[c][i];
     }
   }
+  FloatRows values = Eigen::Map<const Eigen::RowVectorXf>(mean_.data(), k).replicate(rows, 1);
+  values.noalias() += images * basis;
   return values;
 }
 

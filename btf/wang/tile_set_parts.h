@@ -8,9 +8,9 @@
 //   TESSERA_ASSIGN_OR_RETURN(auto assembler, TileSetAssembler::Begin(first));
 //   TESSERA_RETURN_IF_ERROR(assembler.Add(second));   // at any time: assembler.tile_set()
 //
-// Parts bring coefficients, one after the other, or all that they hold in layers, coarse first
-// (tile_set_layers.h). A coefficient that is not here yet has one value for all texels: its mean, or, cut by
-// coefficients, 0 where it means nothing without entries of a codec's table.
+// Parts bring coefficients as they are, or coarse ones in layers (tile_set_layers.h), or the exact ones in
+// their place. A coefficient that is not here yet has one value for all texels, its `fill`: the mean where
+// that needs no entry of a codec's table, else 0.
 #pragma once
 
 #include <cstddef>
@@ -33,14 +33,14 @@
 
 namespace tessera {
 
-// How a tile set is cut: by coefficients, or into layers.
+// How a tile set is cut: by coefficients, into layers, or both, the first coefficients before the layers and
+// the others after them.
 struct TileSetCut {
   std::vector<uint32_t> tiles;  // ascending, each once; none: all
-  std::vector<uint32_t> order;  // [k], a permutation of the coefficients
-  std::vector<uint32_t> ends;   // part i holds order[ends[i - 1]] .. order[ends[i] - 1]; ascending up to k
+  std::vector<uint32_t> order;  // [k], a permutation of the coefficients; of layers alone empty
+  std::vector<uint32_t> ends;   // prefix i adds order[ends[i - 1]] .. order[ends[i] - 1]; ascending up to k
   std::vector<float> fill;      // [k], finite; 0 where CoefficientTables::NeedsEntries
-  // Where given, part i is layer i; order, ends and fill are not used. Each texel is a BTFel of its own,
-  // then.
+  // May be null. Tiles hold whole blocks. Of coefficients that the first prefix brings nothing.
   std::shared_ptr<const TileSetLayers> layers;
   // What the parts were cut from: `tile_set_sha256`, `level`, ..; recorded in the assembled set.
   nlohmann::json origin = nlohmann::json::object();
@@ -52,13 +52,11 @@ class TileSetCutter {
   // Errors: INVALID_ARGUMENT naming what of the tile set or the cut is misshapen.
   [[nodiscard]] static absl::StatusOr<TileSetCutter> Create(const TileSet& tile_set, TileSetCut cut);
 
-  [[nodiscard]] size_t num_parts() const {
-    return cut_.layers == nullptr ? cut_.ends.size() : cut_.layers->layers.size();
-  }
+  [[nodiscard]] size_t num_parts() const { return cut_.ends.size() + num_layers(); }
   // That a part below num_parts() and those before it bring.
   [[nodiscard]] size_t num_coefficients(size_t part) const;
   // Of the tiles.
-  [[nodiscard]] size_t num_btfels() const { return num_btfels_; }
+  [[nodiscard]] size_t num_btfels() const { return btfels_.size(); }
   // The bytes of a part below num_parts(). All but the first name the first, by its SHA-256. Same arguments,
   // same bytes. Errors: those of SerializeContainer.
   [[nodiscard]] absl::StatusOr<std::string> Part(size_t index, std::string_view first_sha256) const;
@@ -67,13 +65,25 @@ class TileSetCutter {
   TileSetCutter(const TileSet& tile_set, TileSetCut cut, CoefficientTables tables)
       : tile_set_(&tile_set), cut_(std::move(cut)), tables_(std::move(tables)) {}
 
+  // What a part brings.
+  struct Piece {
+    bool is_layer = false;
+    size_t index = 0;  // of the layer or prefix
+  };
+
   void FindBtfels();
-  [[nodiscard]] size_t num_tiles() const;
+  // Errors: INVALID_ARGUMENT where the tiles' BTFels are not whole blocks.
+  [[nodiscard]] absl::Status FindBlocks();
+  [[nodiscard]] size_t num_layers() const { return cut_.layers == nullptr ? 0 : cut_.layers->layers.size(); }
+  [[nodiscard]] Piece PieceOf(size_t part) const;
+  [[nodiscard]] std::vector<uint32_t> CoefficientsOf(const Piece& piece) const;
+  // That the parts before it bring, each once.
+  [[nodiscard]] std::vector<uint32_t> CoefficientsBefore(size_t part) const;
   [[nodiscard]] bool KnowsPixels() const;
   [[nodiscard]] std::vector<uint32_t> Labels() const;
   [[nodiscard]] absl::Status AddHead(Container& container) const;
-  void AddColumns(size_t index, Container& container) const;
-  void AddLayer(size_t index, Container& container) const;
+  void AddColumns(size_t part, Container& container) const;
+  void AddLayer(size_t part, Container& container) const;
   // Entries of tables that belong to these coefficients and to none of those before.
   void AddEntries(std::span<const uint32_t> coefficients, std::span<const uint32_t> before,
                   Container& container) const;
@@ -81,8 +91,8 @@ class TileSetCutter {
   const TileSet* tile_set_;
   TileSetCut cut_;
   CoefficientTables tables_;
-  std::vector<uint32_t> btfels_;  // those that the tiles reference, ascending; not of layers
-  size_t num_btfels_ = 0;
+  std::vector<uint32_t> btfels_;  // those that the tiles reference, ascending
+  std::vector<uint32_t> blocks_;  // theirs, where there are layers
 };
 
 // A tile set as it grows. After an error of Add it is what it was before. Not thread-safe.
@@ -98,8 +108,15 @@ class TileSetAssembler {
 
   // Tiles that were not asked for are flat; Redress refuses dressings that show them. `metadata` has an
   // object `part`: the origin, `tiles` (where not all are here), `num_coefficients` that are here.
-  [[nodiscard]] const TileSet& tile_set() const { return tile_set_; }
-  [[nodiscard]] TileSet Take() && { return std::move(tile_set_); }
+  // Not const: layers are added up when their sum is asked for.
+  [[nodiscard]] const TileSet& tile_set() {
+    Quantize();
+    return tile_set_;
+  }
+  [[nodiscard]] TileSet Take() && {
+    Quantize();
+    return std::move(tile_set_);
+  }
   [[nodiscard]] const nlohmann::json& origin() const { return origin_; }
   // Ascending; none: all.
   [[nodiscard]] const std::vector<uint32_t>& tiles() const { return tiles_; }
@@ -114,10 +131,17 @@ class TileSetAssembler {
   [[nodiscard]] absl::Status ReadHead(const Container& container);
   [[nodiscard]] absl::Status ReadTables(const nlohmann::json& header, const Container& container);
   [[nodiscard]] absl::Status ReadTiles(const Container& container);
-  [[nodiscard]] absl::Status CheckNew(std::span<const uint32_t> coefficients) const;
+  // Whether they are in range, each once, and not among those before.
+  [[nodiscard]] absl::Status CheckNew(std::span<const uint32_t> coefficients,
+                                      std::span<const uint32_t> before) const;
+  [[nodiscard]] absl::Status BeginLayers(const Container& container);
   [[nodiscard]] absl::Status AddPart(const Container& container);
   [[nodiscard]] absl::Status AddColumns(const Container& container);
   [[nodiscard]] absl::Status AddLayer(const Container& container);
+  [[nodiscard]] absl::Status SumLayer(const Container& container);
+  void Hold(std::span<const uint32_t> coefficients);
+  // All BTFels become what the layers say, but for exact coefficients.
+  void Quantize();
   // The shared tables with the entries that these coefficients need; no codes.
   [[nodiscard]] absl::StatusOr<BtfelTable> TablesWith(std::span<const uint32_t> coefficients,
                                                       const Container& container) const;
@@ -128,8 +152,11 @@ class TileSetAssembler {
   nlohmann::json origin_ = nlohmann::json::object();
   std::vector<uint32_t> tiles_;
   std::optional<CoefficientTables> tables_;
-  std::vector<uint32_t> held_;      // coefficients
-  std::optional<LayerSum> layers_;  // of a set that comes in layers
+  std::vector<uint32_t> held_;      // coefficients, each once
+  std::vector<bool> is_held_;       // [k]
+  std::vector<uint32_t> exact_;     // of these, those that no layer makes
+  std::optional<LayerSum> layers_;  // once the first has come
+  bool is_stale_ = false;           // they are not in the tile set yet
   size_t num_btfels_ = 0;
   size_t num_parts_ = 0;
   size_t parts_ = 0;  // that there are

@@ -57,6 +57,9 @@ std::optional<std::string> BlobCache::Read(std::string_view sha256) const {
 }
 
 absl::Status BlobCache::Put(std::string_view sha256, std::string_view bytes) const {
+  if (bytes.size() > limit_bytes_) {
+    return absl::OkStatus();
+  }
   TESSERA_ASSIGN_OR_RETURN(Partial partial, Begin(sha256));
   TESSERA_RETURN_IF_ERROR(partial.Clear());
   TESSERA_RETURN_IF_ERROR(partial.Append(bytes));

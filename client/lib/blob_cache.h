@@ -29,7 +29,8 @@ class BlobCache {
   // The blob, or nothing when it is not here. A file whose bytes do not match its name is removed.
   [[nodiscard]] std::optional<std::string> Read(std::string_view sha256) const;
 
-  // Keeps bytes whose digest the caller has checked. Errors: those of Begin and Finish.
+  // Keeps bytes whose digest the caller has checked, unless they are more than the limit. Errors: those of
+  // Begin and Finish.
   [[nodiscard]] absl::Status Put(std::string_view sha256, std::string_view bytes) const;
 
   // A download in progress, held by one process at a time. Not thread-safe.

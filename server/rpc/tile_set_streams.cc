@@ -13,7 +13,6 @@
 #include "btf/base/reason.h"
 #include "btf/base/sha256.h"
 #include "btf/base/status_macros.h"
-#include "btf/refine/level_layers.h"
 #include "btf/refine/level_set.h"
 #include "btf/refine/refinement.h"
 #include "server/jobs/job.h"
@@ -106,19 +105,12 @@ absl::StatusOr<std::shared_ptr<const TileSetStreams::Source>> TileSetStreams::Fi
       source->level_rmse = level.rmse;
     }
   }
-  if (needs.level == 0) {
-    TESSERA_ASSIGN_OR_RETURN(Refinement refinement, MakeRefinement(*source->tile_set, needs.light, context));
-    source->cut.order = std::move(refinement.order);
-    source->cut.ends = std::move(refinement.ends);
-    source->cut.fill = std::move(refinement.fill);
-    source->rmse = std::move(refinement.rmse);
-    source->directions = std::move(refinement.directions);
-  } else {
-    TESSERA_ASSIGN_OR_RETURN(LevelLayers layers, MakeLevelLayers(*source->tile_set, needs.light, context));
-    source->cut.layers = std::move(layers.layers);
-    source->rmse = std::move(layers.rmse);
-    source->directions = std::move(layers.directions);
-  }
+  const TileSet& tile_set = *source->tile_set;
+  TESSERA_ASSIGN_OR_RETURN(
+      source->refinement,
+      MakeRefinement(tile_set.btfels,
+                     {.level_tile_size = needs.level == 0 ? 0 : tile_set.tile_size, .light = needs.light},
+                     context));
   sources_.push_front(source);
   return source;
 }
@@ -134,7 +126,7 @@ absl::StatusOr<std::shared_ptr<TileSetStreams::Cut>> TileSetStreams::FindCut(con
   auto cut = std::make_shared<Cut>();
   cut->key = key;
   cut->source = source;
-  TileSetCut of_tiles = source->cut;
+  TileSetCut of_tiles = source->refinement.cut;
   of_tiles.tiles = needs.tiles;
   of_tiles.origin = {
       {"tile_set_sha256", sha256}, {"level", needs.level}, {"light", SceneLightName(needs.light)}};
@@ -200,12 +192,12 @@ absl::StatusOr<PlannedStream> TileSetStreams::Plan(const v1::TileSet& tile_set, 
   plan.set_num_btfels(static_cast<uint32_t>(cut->cutter->num_btfels()));
   plan.set_num_coefficients(static_cast<uint32_t>(source.tile_set->btfels.num_coefficients));
   plan.set_level_rmse(source.level_rmse);
-  plan.set_directions(source.directions);
+  plan.set_directions(source.refinement.directions);
   uint64_t bytes = 0;
   for (size_t part = 0; part < cut->cutter->num_parts(); ++part) {
     TESSERA_RETURN_IF_ERROR(context.CheckStop());
     TESSERA_RETURN_IF_ERROR(MakePart(part, *cut));
-    const double reached = part == 0 ? 0.0 : source.rmse[part - 1];
+    const double reached = part == 0 ? 0.0 : source.refinement.rmse[part - 1];
     bytes += cut->parts[part]->size();
     if (needs.max_bytes.has_value() && bytes > *needs.max_bytes) {
       if (part == 0) {
@@ -223,9 +215,9 @@ absl::StatusOr<PlannedStream> TileSetStreams::Plan(const v1::TileSet& tile_set, 
     message.set_sha256(cut->digests[part]);
     message.set_size_bytes(cut->parts[part]->size());
     message.set_num_coefficients(static_cast<uint32_t>(cut->cutter->num_coefficients(part)));
-    message.set_rmse(source.rmse[part]);
+    message.set_rmse(source.refinement.rmse[part]);
     planned.parts.push_back(cut->parts[part]);
-    if (needs.max_error.has_value() && source.rmse[part] <= *needs.max_error) {
+    if (needs.max_error.has_value() && source.refinement.rmse[part] <= *needs.max_error) {
       break;
     }
   }

@@ -19,6 +19,7 @@
 #include <absl/status/statusor.h>
 
 #include "btf/base/run_context.h"
+#include "btf/refine/refinement.h"
 #include "btf/wang/scene_needs.h"
 #include "btf/wang/tile_set.h"
 #include "btf/wang/tile_set_parts.h"
@@ -55,9 +56,7 @@ class TileSetStreams {
     std::string key;
     std::shared_ptr<const TileSet> tile_set;
     double level_rmse = 0.0;
-    TileSetCut cut;            // of all tiles: by coefficients, a level into layers
-    std::vector<double> rmse;  // of each prefix
-    std::string directions;    // what these errors are over, in words
+    Refinement refinement;
   };
   // A source cut for some tiles; parts are made as they are asked for.
   struct Cut {

@@ -1,5 +1,5 @@
-// Choices on the measured wool [Sattler2003], 81 views and lights: the uppermost 40 of its 128 rows, in a third of the
-// time.
+// Choices on the measured wool [Sattler2003], 81 views and lights: the uppermost 40 of its 128 rows, in a
+// third of the time.
 #include <chrono>
 #include <cstdio>
 

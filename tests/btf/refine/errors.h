@@ -19,6 +19,8 @@ namespace tessera {
 inline constexpr double kMostErrorRatio = 1.6;
 // Stored directions are float32.
 inline constexpr double kDirectionRounding = 1e-6;
+// Of values of layers, which are rounded anew.
+inline constexpr double k8BitRmse = 0.003;
 
 inline TileSet TileSetOf(const std::string& codec, int tile_size) {
   SampledBtf btf = ShinyBtf(6, 6, RingDirections(3, 6), RingDirections(3, 7));

@@ -15,19 +15,26 @@ namespace {
 
 using ::testing::HasSubstr;
 
-TEST(TileCosinesTest, AreOrthonormalForEverySide) {
+TEST(BlockCosinesTest, AreOrthonormalForEverySide) {
   for (const int side : {1, 2, 3, 8, 20}) {
-    const TileCosines transform(side);
-    FloatRows texels = FloatRows::Random(side, side);
-    const FloatRows cosines = transform.Forward(texels);
-    EXPECT_NEAR(cosines.norm(), texels.norm(), 1e-5F * texels.norm()) << side;
-    EXPECT_LT((transform.Back(cosines) - texels).cwiseAbs().maxCoeff(), 1e-5F) << side;
-    EXPECT_NEAR(cosines(0, 0), texels.sum() / static_cast<float>(side), 1e-4F) << side;
+    const BlockCosines transform(side);
+    const Eigen::VectorXf image = Eigen::VectorXf::Random(3 * side * side);
+    const std::vector<float> cosines = transform.Forward(std::span(image.data(), 3 * side * side));
+    EXPECT_NEAR(Eigen::Map<const Eigen::VectorXf>(cosines.data(), 3 * side * side).norm(), image.norm(),
+                1e-4F)
+        << side;
+    const std::vector<float> back = transform.Back(cosines);
+    for (int i = 0; i < 3 * side * side; ++i) {
+      ASSERT_NEAR(back[i], image[i], 1e-5F) << side;
+    }
+    // The first cosine of block 1.
+    EXPECT_NEAR(cosines[1], image.segment(side * side, side * side).sum() / static_cast<float>(side), 1e-4F)
+        << side;
   }
 }
 
-TEST(TileFrequenciesTest, ComeByRisingSumAndTheUpperHalfIsCoarser) {
-  const std::vector<TileFrequency> frequencies = TileFrequencies(4);
+TEST(BlockFrequenciesTest, ComeByRisingSumAndTheUpperHalfIsCoarser) {
+  const std::vector<BlockFrequency> frequencies = BlockFrequencies(4);
   ASSERT_EQ(frequencies.size(), 16u);
   EXPECT_EQ(frequencies[1].u, 1);
   EXPECT_EQ(frequencies[1].v, 0);
@@ -37,11 +44,11 @@ TEST(TileFrequenciesTest, ComeByRisingSumAndTheUpperHalfIsCoarser) {
   EXPECT_EQ(StepFactor({0, 0}, 1), 1.0F);
 }
 
-// Two tiles of 2x2 texels, three coefficients, of which layer 0 brings 0 and 2 by one component.
+// Two blocks of 2x2 BTFels, three coefficients, of which layer 0 brings 0 and 2 by one component.
 TileSetLayer FirstLayer() {
   TileSetLayer layer{
       .step = 0.5F, .coefficients = {0, 2}, .spans = {0}, .basis_step = {0.25F}, .basis = {4, -8}};
-  layer.codes = {6, 2, 0, 1, 0, 0, 0, 0};  // [frequency][tile]
+  layer.codes = {6, 2, 0, 1, 0, 0, 0, 0};  // [frequency][block]
   return layer;
 }
 LayerSum SumOfNothing() {
@@ -51,16 +58,16 @@ LayerSum SumOfNothing() {
 TEST(LayerSumTest, IsMeanAndBasisTimesImages) {
   LayerSum sum = SumOfNothing();
   ASSERT_TRUE(sum.Add(FirstLayer()).ok());
-  std::vector<uint32_t> texels(8);
-  std::iota(texels.begin(), texels.end(), 0u);
-  const FloatRows values = sum.Coefficients(texels);
-  // Tile 0: a constant of 6 * 0.5 / 2. Tile 1: 2 * 0.5 / 2, and a cosine of 1 * 0.5 * 2 across, +-0.5 a
+  std::vector<uint32_t> btfels(8);
+  std::iota(btfels.begin(), btfels.end(), 0u);
+  const FloatRows values = sum.Coefficients(btfels);
+  // Block 0: a constant of 6 * 0.5 / 2. Block 1: 2 * 0.5 / 2, and a cosine of 1 * 0.5 * 2 across, +-0.5 a
   // texel.
   const std::vector<float> image = {1.5F, 1.5F, 1.5F, 1.5F, 1.0F, 0.0F, 1.0F, 0.0F};
-  for (int texel = 0; texel < 8; ++texel) {
-    EXPECT_NEAR(values(texel, 0), 1.0F + 1.0F * image[texel], 1e-6F) << texel;
-    EXPECT_EQ(values(texel, 1), 10.0F);
-    EXPECT_NEAR(values(texel, 2), 100.0F - 4.0F * image[texel], 1e-5F) << texel;
+  for (int btfel = 0; btfel < 8; ++btfel) {
+    EXPECT_NEAR(values(btfel, 0), 1.0F + 1.0F * image[btfel], 1e-6F) << btfel;
+    EXPECT_EQ(values(btfel, 1), 10.0F);
+    EXPECT_NEAR(values(btfel, 2), 100.0F - 4.0F * image[btfel], 1e-5F) << btfel;
   }
   // A second layer makes the image finer, and brings coefficient 1.
   TileSetLayer second{.step = 0.125F, .coefficients = {1}, .spans = {1}, .basis_step = {1.0F}, .basis = {1}};
@@ -68,10 +75,12 @@ TEST(LayerSumTest, IsMeanAndBasisTimesImages) {
   second.codes[0] = -1;
   second.codes[8] = 16;
   ASSERT_TRUE(sum.Add(second).ok());
-  const FloatRows finer = sum.Coefficients(texels);
+  const FloatRows finer = sum.Coefficients(btfels);
   EXPECT_NEAR(finer(3, 0), 1.0F + 1.5F - 0.0625F, 1e-6F);
   EXPECT_NEAR(finer(3, 1), 11.0F, 1e-6F);
   EXPECT_NEAR(finer(4, 1), 10.0F, 1e-6F);
+  EXPECT_GE(sum.Bound(), finer.maxCoeff());
+  EXPECT_LE(sum.Bound(), 120.0F);
 }
 
 TEST(LayerSumTest, RefusesWhatDoesNotFitAndStaysWhatItWas) {

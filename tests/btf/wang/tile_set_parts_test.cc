@@ -174,10 +174,26 @@ TEST(TileSetPartsTest, DamagedPartsAreRefused) {
   EXPECT_TRUE(assembler->Add(BytesOf(parts[1])).ok());
 }
 
-// Coefficients 0 to 5 by two components of waves over the tile, the others in a second part by one.
+// As levels are: each texel a BTFel of its own, in order.
+TileSet LevelLikeTileSet() {
+  TileSet tile_set = SmallTileSet("surface-26");
+  const BtfelTable from = tile_set.btfels;
+  tile_set.btfels = from.WithoutCodes();
+  tile_set.source_pixels.clear();
+  for (size_t i = 0; i < tile_set.tile_index.size(); ++i) {
+    uint32_t& texel = tile_set.tile_index[i];
+    for (const uint8_t code : from.btfel(BtfelOfTexel(texel))) {
+      tile_set.btfels.codes.push_back(code);
+    }
+    texel = PackTexel(static_cast<uint32_t>(i), TurnsOfTexel(texel));
+  }
+  return tile_set;
+}
+
+// Coefficients 0 to 5 by two components of waves over the tile, the others in a second layer by one.
 TileSetCut LayeredCutOf(const TileSet& tile_set, std::vector<uint32_t> tiles = {}) {
   const size_t num_tiles = tile_set.tile_codes.size();
-  TileSetLayers layers;
+  TileSetLayers layers{.block_side = 8};
   for (int i = 0; i < 12; ++i) {
     layers.mean.push_back(0.1F * static_cast<float>(i));
     layers.scale.push_back(1.0F + static_cast<float>(i));
@@ -198,12 +214,13 @@ TileSetCut LayeredCutOf(const TileSet& tile_set, std::vector<uint32_t> tiles = {
   layers.layers = {std::move(first), std::move(second)};
   TileSetCut cut;
   cut.tiles = std::move(tiles);
+  cut.fill.assign(12, 0.0F);
   cut.layers = std::make_shared<const TileSetLayers>(std::move(layers));
   return cut;
 }
 
 TEST(TileSetPartsTest, LayersAddUpToTheirSum) {
-  const TileSet tile_set = SmallTileSet("surface-26");
+  const TileSet tile_set = LevelLikeTileSet();
   for (const std::vector<uint32_t>& tiles : {std::vector<uint32_t>{}, std::vector<uint32_t>{4, 20}}) {
     const TileSetCut cut = LayeredCutOf(tile_set, tiles);
     const std::vector<std::string> parts = PartsOf(tile_set, cut);
@@ -239,7 +256,7 @@ TEST(TileSetPartsTest, LayersAddUpToTheirSum) {
 }
 
 TEST(TileSetPartsTest, DamagedLayersAreRefused) {
-  const TileSet tile_set = SmallTileSet("surface-26");
+  const TileSet tile_set = LevelLikeTileSet();
   const std::vector<std::string> parts = PartsOf(tile_set, LayeredCutOf(tile_set));
   const auto begin_fails = [&](const auto& change, const char* what) {
     const auto assembler = TileSetAssembler::Begin(BytesOf(Changed(parts[0], change)));
@@ -252,7 +269,7 @@ TEST(TileSetPartsTest, DamagedLayersAreRefused) {
   begin_fails([&](Container& c) { set(c, "layer_step", 0, 0); }, "step 0");
   begin_fails([&](Container& c) { set(c, "layer_step", 0, 0x7fc00000); }, "step nan");
   begin_fails([&](Container& c) { set(c, "basis_step", 1, 0xbf800000); }, "basis_step");
-  begin_fails([&](Container& c) { set(c, "basis_step", 0, 0x7f7fffff); }, "not finite");
+  begin_fails([&](Container& c) { set(c, "basis_step", 0, 0x7f7fffff); }, "coefficients up to");
   begin_fails([&](Container& c) { set(c, "spans", 1, 1); }, "'spans': layer 1");
   begin_fails([&](Container& c) { set(c, "reach", 0, 65); }, "'reach': 2 values");
   begin_fails([&](Container& c) { set(c, "reach", 0, 2); }, "'codes'");
@@ -265,8 +282,9 @@ TEST(TileSetPartsTest, DamagedLayersAreRefused) {
         large.bytes.clear();
       },
       "'basis_large'");
-  // Two texels of one BTFel: not what layers are.
-  begin_fails([&](Container& c) { set(c, "tile_index", 7, 0); }, "expected one for each texel");
+  begin_fails([](Container& c) { c.header["block_side"] = 7; }, "block_side 7");
+  begin_fails([](Container& c) { c.header["block_side"] = 0; }, "block_side");
+  begin_fails([](Container& c) { c.header.erase("block_side"); }, "block_side");
 
   auto assembler = TileSetAssembler::Begin(BytesOf(parts[0]));
   ASSERT_TRUE(assembler.ok());
@@ -276,8 +294,58 @@ TEST(TileSetPartsTest, DamagedLayersAreRefused) {
   EXPECT_TRUE(assembler->Add(BytesOf(parts[1])).ok());
 }
 
-TEST(TileSetPartsTest, CutsIntoLayersAreChecked) {
+// Coefficients 8 and 3 as they are, all others coarse by one component, then as they are.
+TEST(TileSetPartsTest, LayersComeBetweenExactCoefficients) {
   const TileSet tile_set = SmallTileSet("surface-26");
+  TileSetCut cut;
+  cut.tiles = {2, 7};
+  cut.order = {8, 3, 0, 1, 2, 4, 5, 6, 7, 9, 10, 11};
+  cut.ends = {2, 6, 12};
+  cut.fill.assign(12, 0.5F);
+  TileSetLayers layers;
+  layers.mean.assign(12, 2.0F);
+  layers.scale.assign(12, 1.0F);
+  TileSetLayer layer{.step = 1.0F, .spans = {0}, .basis_step = {1.0F}};
+  layer.coefficients = {0, 1, 2, 4, 5, 6, 7, 9, 10, 11};
+  layer.basis.assign(10, 1);
+  for (int btfel = 0; btfel < 50; ++btfel) {
+    layer.codes.push_back(btfel);
+  }
+  layers.layers = {layer};
+  cut.layers = std::make_shared<const TileSetLayers>(layers);
+  const std::vector<std::string> parts = PartsOf(tile_set, cut);
+  ASSERT_EQ(parts.size(), 4u);
+  auto assembler = TileSetAssembler::Begin(BytesOf(parts[0]));
+  ASSERT_TRUE(assembler.ok()) << assembler.status();
+  EXPECT_EQ(assembler->num_coefficients(), 2u);
+  const auto value = [&](int tile, int coefficient) {
+    const BtfelTable& now = assembler->tile_set().btfels;
+    return now.offset[coefficient] +
+           now.step[coefficient] *
+               now.btfel(BtfelOfTexel(assembler->tile_set().texel(tile, 3, 4)))[coefficient];
+  };
+  const uint32_t shown = BtfelOfTexel(tile_set.texel(7, 3, 4));
+  const auto exact = [&](int coefficient) {
+    return tile_set.btfels.offset[coefficient] +
+           tile_set.btfels.step[coefficient] * tile_set.btfels.btfel(shown)[coefficient];
+  };
+  EXPECT_EQ(value(7, 8), exact(8));
+  EXPECT_EQ(value(7, 9), 0.5F);
+  ASSERT_TRUE(assembler->Add(BytesOf(parts[1])).ok());
+  EXPECT_EQ(assembler->num_coefficients(), 12u);
+  EXPECT_EQ(value(7, 8), exact(8));
+  EXPECT_NEAR(value(7, 9), 2.0F + static_cast<float>(shown), 0.2F);
+  ASSERT_TRUE(assembler->Add(BytesOf(parts[2])).ok());
+  EXPECT_EQ(value(7, 4), exact(4));
+  EXPECT_NEAR(value(7, 9), 2.0F + static_cast<float>(shown), 0.2F);
+  EXPECT_FALSE(assembler->Add(BytesOf(parts[2])).ok());
+  ASSERT_TRUE(assembler->Add(BytesOf(parts[3])).ok());
+  EXPECT_EQ(value(7, 9), exact(9));
+  EXPECT_TRUE(assembler->is_complete());
+}
+
+TEST(TileSetPartsTest, CutsIntoLayersAreChecked) {
+  const TileSet tile_set = LevelLikeTileSet();
   const auto refused = [&](const auto& change, const char* what) {
     TileSetCut cut = LayeredCutOf(tile_set);
     TileSetLayers layers = *cut.layers;
@@ -290,6 +358,16 @@ TEST(TileSetPartsTest, CutsIntoLayersAreChecked) {
   refused([](TileSetLayers& layers) { layers.mean.pop_back(); }, "mean of 11");
   refused([](TileSetLayers& layers) { layers.layers[1].spans = {2}; }, "layer 2");
   refused([](TileSetLayers& layers) { layers.tables["luma"] = {}; }, "table 'luma'");
+  refused([](TileSetLayers& layers) { layers.block_side = 7; }, "blocks of 49 of 1664 BTFels");
+  // Tiles of part of a block.
+  TileSetCut cut = LayeredCutOf(tile_set, {1});
+  TileSetLayers layers = *cut.layers;
+  layers.block_side = 16;
+  for (TileSetLayer& layer : layers.layers) {
+    layer.codes.resize(layer.codes.size() / 26 * 26);
+  }
+  cut.layers = std::make_shared<const TileSetLayers>(std::move(layers));
+  EXPECT_FALSE(TileSetCutter::Create(tile_set, std::move(cut)).ok());
 }
 
 TEST(SceneNeedsTest, FollowFromADressingAndItsSize) {

@@ -1,4 +1,4 @@
-#include "btf/refine/level_layers.h"
+#include "btf/refine/set_layers.h"
 
 #include <algorithm>
 #include <cmath>
@@ -16,13 +16,24 @@
 namespace tessera {
 namespace {
 
-// Of the values, which are rounded anew.
-constexpr double k8BitRmse = 0.003;
-
 TileSet LevelOf(const std::string& codec) {
   auto level = MakeLevelSet(TileSetOf(codec, 8), 1, {});
   EXPECT_TRUE(level.ok()) << level.status();
   return std::move(level->tile_set);
+}
+
+absl::StatusOr<SetLayers> LayersOf(const TileSet& level, SceneLight light = SceneLight::kPoint,
+                                   const RunContext& context = {}) {
+  return MakeSetLayers(level.btfels, {.block_side = level.tile_size, .exact = {}, .light = light}, context);
+}
+
+// Layers alone.
+TileSetCut CutOf(const TileSet& level, const SetLayers& layers, std::vector<uint32_t> tiles = {}) {
+  TileSetCut cut;
+  cut.tiles = std::move(tiles);
+  cut.fill.assign(level.btfels.num_coefficients, 0.0F);
+  cut.layers = layers.layers;
+  return cut;
 }
 
 class CodecLayersTest : public ::testing::TestWithParam<std::string> {};
@@ -32,13 +43,13 @@ INSTANTIATE_TEST_SUITE_P(AllCodecs, CodecLayersTest, ::testing::ValuesIn(AllCode
 // The plan's errors against those of the sets that the parts make, over all directions.
 TEST_P(CodecLayersTest, EveryPrefixIsAValidSetWhoseErrorIsAsStated) {
   const TileSet level = LevelOf(GetParam());
-  const auto layered = MakeLevelLayers(level, SceneLight::kPoint, {});
+  const auto layered = LayersOf(level);
   ASSERT_TRUE(layered.ok()) << layered.status();
-  const auto cutter = TileSetCutter::Create(level, {.layers = layered->layers});
+  const auto cutter = TileSetCutter::Create(level, CutOf(level, *layered));
   ASSERT_TRUE(cutter.ok()) << cutter.status();
   ASSERT_EQ(cutter->num_parts(), layered->rmse.size());
   ASSERT_GE(cutter->num_parts(), 3u);
-  EXPECT_LE(layered->rmse.back(), kLevelEndRmse);
+  EXPECT_LE(layered->rmse.back(), kLayersEndRmse);
   EXPECT_TRUE(std::ranges::is_sorted(layered->rmse, std::greater()));
   const std::string first = cutter->Part(0, "").value();
   auto assembler = TileSetAssembler::Begin(std::as_bytes(std::span(first)));
@@ -73,7 +84,7 @@ TEST_P(CodecLayersTest, OneComponentServesAMaterialOfOneDimension) {
       table.codes.data()[btfel * k + c] = static_cast<uint8_t>(std::lround(128.0 + share * (end - 128.0)));
     }
   }
-  const auto layered = MakeLevelLayers(level, SceneLight::kPoint, {});
+  const auto layered = LayersOf(level);
   ASSERT_TRUE(layered.ok()) << layered.status();
   size_t components = 0;
   for (const TileSetLayer& layer : layered->layers->layers) {
@@ -81,31 +92,29 @@ TEST_P(CodecLayersTest, OneComponentServesAMaterialOfOneDimension) {
   }
   // Codecs with tables bring coefficients in several layers, and each layer has components of its own.
   EXPECT_LE(components, 3 * layered->layers->layers.size());
-  EXPECT_LE(layered->rmse.back(), kLevelEndRmse);
+  EXPECT_LE(layered->rmse.back(), kLayersEndRmse);
 }
 
 TEST_P(CodecLayersTest, EnvironmentsHaveComponentsOfTheirOwnAndAllIsRepeatable) {
   const TileSet level = LevelOf(GetParam());
-  const auto sky = MakeLevelLayers(level, SceneLight::kEnvironment, {});
-  const auto again = MakeLevelLayers(level, SceneLight::kEnvironment, {});
+  const auto sky = LayersOf(level, SceneLight::kEnvironment);
+  const auto again = LayersOf(level, SceneLight::kEnvironment);
   ASSERT_TRUE(sky.ok()) << sky.status();
   ASSERT_TRUE(again.ok()) << again.status();
-  EXPECT_THAT(sky->directions, ::testing::HasSubstr("soft lights"));
   EXPECT_EQ(sky->rmse, again->rmse);
-  const auto part = [&](const LevelLayers& layers) {
-    return TileSetCutter::Create(level, {.tiles = {3, 90}, .layers = layers.layers})->Part(0, "").value();
+  const auto part = [&](const SetLayers& layers) {
+    return TileSetCutter::Create(level, CutOf(level, layers, {3, 90}))->Part(0, "").value();
   };
   EXPECT_EQ(part(*sky), part(*again));
-  const auto point = MakeLevelLayers(level, SceneLight::kPoint, {});
+  const auto point = LayersOf(level);
   EXPECT_NE(part(*sky), part(*point));
 }
 
-TEST(LevelLayersTest, StopsWhenAsked) {
+TEST(SetLayersTest, StopsWhenAsked) {
   const TileSet level = LevelOf("dsh-cls");
   std::stop_source stop;
   stop.request_stop();
-  EXPECT_TRUE(
-      absl::IsCancelled(MakeLevelLayers(level, SceneLight::kPoint, {.stop = stop.get_token()}).status()));
+  EXPECT_TRUE(absl::IsCancelled(LayersOf(level, SceneLight::kPoint, {.stop = stop.get_token()}).status()));
 }
 
 }  // namespace

@@ -1,4 +1,4 @@
-#include "btf/refine/level_layers.h"
+#include "btf/refine/set_layers.h"
 
 #include <algorithm>
 #include <cfloat>
@@ -22,7 +22,6 @@
 namespace tessera {
 namespace {
 
-constexpr size_t kSampledTexels = 1024;
 // Of which components are the principal ones: more than errors are measured over, or they would fit those
 // alone.
 constexpr int kLightsPerView = 8;
@@ -30,9 +29,9 @@ constexpr float kFirstStep = 1.0F / 16.0F;
 // What a step leaves lies evenly within half of it on either side: thirds of it spend their bits best.
 constexpr float kStepRatio = 3.0F;
 constexpr float kLastStep = 1.0F / 4096.0F;
-// Two blocks beyond the first find this many components well enough.
-constexpr Eigen::Index kBlockComponents = 32;
-constexpr int kBlocks = 3;
+// The first of the components that so many blocks make matter most, and are found best.
+constexpr int kBlocks = 4;
+constexpr Eigen::Index kBlockComponents = kMostComponents / kBlocks;
 // Components and tables are as exact as images of this step, so that later layers need not mend them.
 constexpr float kSharedStep = 1.0F / 1024.0F;
 // Tables with fewer entries for a coefficient hold offsets and steps, which are not rounded.
@@ -44,9 +43,9 @@ constexpr double kSquaresPerByte = 0.92;
 constexpr double kBytesPerBasisCode = 0.6;
 constexpr double kBytesPerEntry = 0.5;
 constexpr double kBytesPerComponent = 16.0;
-constexpr size_t kTexelBlock = 1024;
+constexpr size_t kRows = 1024;
 
-// The principal components of some coefficients, at most kBlocks * kBlockComponents.
+// The principal components of some coefficients, at most kMostComponents.
 struct Components {
   FloatRows project;        // [coefficients][components]
   FloatRows basis;          // [components][coefficients]
@@ -69,7 +68,7 @@ Components PrincipalComponents(const FloatRows& values, const FloatRows& weights
     const Eigen::MatrixXf product = reflected.transpose() * (reflected * lanczos.block());
     lanczos.Add(product);
   }
-  const SingularSpace leading = lanczos.Leading(kBlocks * kBlockComponents);
+  const SingularSpace leading = lanczos.Leading(kMostComponents);
   Eigen::Index count = 0;
   const double texels = std::max<double>(1.0, static_cast<double>(values.rows()));
   while (count < leading.values.size() && leading.values[count] > kLastStep * std::sqrt(texels)) {
@@ -90,23 +89,20 @@ Components PrincipalComponents(const FloatRows& values, const FloatRows& weights
 // The layers so far, and what more may come.
 class LayerCoder {
  public:
-  static absl::StatusOr<LayerCoder> Create(const TileSet& level, SceneLight light,
+  static absl::StatusOr<LayerCoder> Create(const BtfelTable& table, const SetLayersOptions& options,
                                            const RunContext& context) {
-    LayerCoder coder(level);
-    TESSERA_RETURN_IF_ERROR(coder.Measure(light));
+    LayerCoder coder(table, options);
+    TESSERA_RETURN_IF_ERROR(coder.Measure());
     TESSERA_RETURN_IF_ERROR(context.CheckStop());
     return coder;
   }
 
-  absl::StatusOr<LevelLayers> Run(const RunContext& context) {
-    for (float step = kFirstStep; step >= kLastStep; step /= kStepRatio) {
+  absl::StatusOr<SetLayers> Run(const RunContext& context) {
+    for (float step = kFirstStep; step >= kLastStep && rmse_ > kLayersEndRmse; step /= kStepRatio) {
       if (!taken_.empty()) {
         TESSERA_RETURN_IF_ERROR(AddLayer(step, Brings::kFinerImages, context));
       }
       TESSERA_RETURN_IF_ERROR(AddLayer(step, Brings::kComponents, context));
-      if (!result_.rmse.empty() && result_.rmse.back() <= kLevelEndRmse) {
-        break;
-      }
     }
     result_.layers = std::make_shared<const TileSetLayers>(std::move(layers_));
     return std::move(result_);
@@ -115,7 +111,7 @@ class LayerCoder {
  private:
   enum class Brings { kFinerImages, kComponents };
 
-  // A component that may come: its coefficients' layer, its basis, its image's cosines [frequency][tile].
+  // A component that may come: its coefficients' layer, its basis, its image's cosines [frequency][block].
   struct Candidate {
     uint32_t span = 0;
     float basis_step = 0.0F;
@@ -123,26 +119,33 @@ class LayerCoder {
     std::vector<float> cosines;
   };
 
-  explicit LayerCoder(const TileSet& level)
-      : level_(level), frequencies_(TileFrequencies(level.tile_size)), transform_(level.tile_size) {}
+  LayerCoder(const BtfelTable& table, const SetLayersOptions& options)
+      : table_(table),
+        options_(options),
+        frequencies_(BlockFrequencies(options.block_side)),
+        transform_(options.block_side),
+        rmse_(options.rmse) {}
 
-  [[nodiscard]] size_t num_tiles() const { return level_.tile_codes.size(); }
-  [[nodiscard]] size_t num_texels() const { return level_.tile_index.size(); }
+  [[nodiscard]] size_t num_btfels() const { return table_.size(); }
+  [[nodiscard]] size_t num_blocks() const { return table_.size() / frequencies_.size(); }
 
-  absl::Status Measure(SceneLight light) {
-    const BtfelTable& table = level_.btfels;
-    TESSERA_ASSIGN_OR_RETURN(const std::unique_ptr<Decoder> decoder, MakeDecoder(table));
-    weights_ = MakeSceneCases(*decoder, table, light, kLightsPerView).weights;
-    SceneCases cases = MakeSceneCases(*decoder, table, light);
-    result_.directions = std::move(cases.directions);
-    error_weights_ = std::move(cases.weights);
-    TESSERA_ASSIGN_OR_RETURN(tables_, CoefficientTables::Of(table));
-    held_.assign(static_cast<size_t>(table.num_coefficients), false);
-    const std::vector<size_t> sampled = Spread(num_texels(), kSampledTexels);
+  absl::Status Measure() {
+    TESSERA_ASSIGN_OR_RETURN(const std::unique_ptr<Decoder> decoder, MakeDecoder(table_));
+    TESSERA_ASSIGN_OR_RETURN(tables_, CoefficientTables::Of(table_));
+    weights_ = MakeSceneCases(*decoder, table_, options_.light, kLightsPerView).weights;
+    error_weights_ = MakeSceneCases(*decoder, table_, options_.light).weights;
+    held_.assign(static_cast<size_t>(table_.num_coefficients), false);
+    for (const uint32_t coefficient : options_.exact) {
+      held_[coefficient] = true;
+    }
+    const std::vector<size_t> sampled = Spread(num_btfels(), kRefineBtfels);
     sampled_.assign(sampled.begin(), sampled.end());
-    TESSERA_ASSIGN_OR_RETURN(values_, CoefficientsOf(level_, sampled));
+    values_ = CoefficientsOf(table_, sampled);
     whole_ = values_ * error_weights_.transpose();
-    TESSERA_RETURN_IF_ERROR(RoundTables(light));
+    layers_.block_side = options_.block_side;
+    if (options_.exact.empty()) {
+      TESSERA_RETURN_IF_ERROR(RoundTables());
+    }
     const Eigen::RowVectorXf mean = values_.colwise().mean();
     layers_.mean.assign(mean.begin(), mean.end());
     values_.rowwise() -= mean;
@@ -151,7 +154,7 @@ class LayerCoder {
     for (const float each : weight) {
       layers_.scale.push_back(each > 0.0F ? 1.0F / each : 0.0F);
     }
-    // In the mean over texels and cases: squares of the coefficient's mean, and of what differs from it.
+    // In the mean over BTFels and cases: squares of the coefficient's mean, and of what differs from it.
     mean_squares_ = mean.cwiseAbs2().cwiseProduct(weight.cwiseAbs2());
     squares_ = values_.colwise().squaredNorm().cwiseProduct(weight.cwiseAbs2()) /
                static_cast<float>(std::max<Eigen::Index>(values_.rows(), 1));
@@ -185,8 +188,8 @@ class LayerCoder {
 
   // Tables rounded so that each coefficient errs by about kSharedStep's error, and the weights that they
   // give. The error grows as the unit does: rounding a little tells how much more is allowed.
-  absl::Status RoundTables(SceneLight light) {
-    BtfelTable table = level_.btfels.WithoutCodes();
+  absl::Status RoundTables() {
+    BtfelTable table = table_.WithoutCodes();
     std::map<std::string, CodecTable>& rounded = layers_.tables;
     std::vector<std::string> names;
     for (const auto& [name, codec_table] : table.tables) {
@@ -202,12 +205,12 @@ class LayerCoder {
     std::vector<int> bits(held_.size(), 3);
     for (const bool is_trial : {true, false}) {
       for (const std::string& name : names) {
-        const CodecTable& exact = level_.btfels.tables.at(name);
+        const CodecTable& exact = table_.tables.at(name);
         rounded[name] = Rounded(name, exact, bits);
         table.tables[name] = rounded[name];
       }
       TESSERA_ASSIGN_OR_RETURN(const std::unique_ptr<Decoder> decoder, MakeDecoder(table));
-      const FloatRows weights = MakeSceneCases(*decoder, table, light, kLightsPerView).weights;
+      const FloatRows weights = MakeSceneCases(*decoder, table, options_.light, kLightsPerView).weights;
       if (is_trial) {
         const float allowed = kSharedStep / std::sqrt(12.0F);
         for (size_t c = 0; c < bits.size(); ++c) {
@@ -219,7 +222,7 @@ class LayerCoder {
         }
       } else {
         weights_ = weights;
-        error_weights_ = MakeSceneCases(*decoder, table, light).weights;
+        error_weights_ = MakeSceneCases(*decoder, table, options_.light).weights;
       }
     }
     return absl::OkStatus();
@@ -237,14 +240,14 @@ class LayerCoder {
         continue;
       }
       double entries = 0.0;
-      for (const auto& [name, table] : level_.btfels.tables) {
+      for (const auto& [name, table] : table_.tables) {
         if (tables_->IsSplit(name)) {
           entries += static_cast<double>(tables_->EntriesOf(name, std::span(&c, 1), {}).size());
         }
       }
       const double saved =
           mean_squares_[c] + std::max(0.0, static_cast<double>(squares_[c]) - step * step / 12.0);
-      if (saved * static_cast<double>(num_texels()) >
+      if (saved * static_cast<double>(num_btfels()) >
           kSquaresPerByte * step * step * kBytesPerEntry * entries) {
         coefficients.push_back(c);
       }
@@ -262,13 +265,12 @@ class LayerCoder {
     for (size_t i = 0; i < coefficients.size(); ++i) {
       mean[static_cast<Eigen::Index>(i)] = layers_.mean[coefficients[i]];
     }
-    FloatRows images(static_cast<Eigen::Index>(num_texels()), count);
-    for (size_t begin = 0; begin < num_texels(); begin += kTexelBlock) {
+    FloatRows images(static_cast<Eigen::Index>(num_btfels()), count);
+    for (size_t begin = 0; begin < num_btfels(); begin += kRows) {
       TESSERA_RETURN_IF_ERROR(context.CheckStop());
-      std::vector<size_t> texels(std::min(kTexelBlock, num_texels() - begin));
-      std::iota(texels.begin(), texels.end(), begin);
-      TESSERA_ASSIGN_OR_RETURN(const FloatRows all, CoefficientsOf(level_, texels));
-      FloatRows values = ColumnsOf(all, coefficients);
+      std::vector<size_t> btfels(std::min(kRows, num_btfels() - begin));
+      std::iota(btfels.begin(), btfels.end(), begin);
+      FloatRows values = ColumnsOf(CoefficientsOf(table_, btfels), coefficients);
       values.rowwise() -= mean;
       images.middleRows(static_cast<Eigen::Index>(begin), values.rows()) = values * found.project;
     }
@@ -284,31 +286,20 @@ class LayerCoder {
                                : 0.0F;
         candidate.basis.push_back(static_cast<int32_t>(std::lround(code)));
       }
-      candidate.cosines.resize(num_texels());
-      const auto side = static_cast<size_t>(level_.tile_size);
-      FloatRows texels(level_.tile_size, level_.tile_size);
-      for (size_t tile = 0; tile < num_tiles(); ++tile) {
-        for (size_t i = 0; i < side * side; ++i) {
-          texels(static_cast<Eigen::Index>(i / side), static_cast<Eigen::Index>(i % side)) =
-              images(static_cast<Eigen::Index>(tile * side * side + i), c);
-        }
-        const FloatRows cosines = transform_.Forward(texels);
-        for (size_t f = 0; f < frequencies_.size(); ++f) {
-          candidate.cosines[f * num_tiles() + tile] = cosines(frequencies_[f].v, frequencies_[f].u);
-        }
-      }
+      const Eigen::VectorXf image = images.col(c);
+      candidate.cosines = transform_.Forward(std::span(image.data(), num_btfels()));
       candidates_.push_back(std::move(candidate));
     }
     return absl::OkStatus();
   }
 
-  // Codes of what is left of the cosines, [frequency][tile], and the squared error that they save.
+  // Codes of what is left of the cosines, [frequency][block], and the squared error that they save.
   [[nodiscard]] std::pair<std::vector<int32_t>, double> Coded(std::span<const float> wanted,
                                                               std::span<const float> held, float step) const {
     std::vector<int32_t> codes(wanted.size());
     double saved = 0.0;
     for (size_t i = 0; i < wanted.size(); ++i) {
-      const double unit = step * StepFactor(frequencies_[i / num_tiles()], level_.tile_size);
+      const double unit = step * StepFactor(frequencies_[i / num_blocks()], options_.block_side);
       const double left = wanted[i] - (held.empty() ? 0.0F : held[i]);
       const double size = std::floor(std::abs(left) / unit + 0.5 - kDeadZone);
       codes[i] = static_cast<int32_t>(std::copysign(size, left));
@@ -324,16 +315,17 @@ class LayerCoder {
     if (brings == Brings::kComponents) {
       layer.coefficients = NewCoefficients(step);
     }
+    const size_t candidates_before = candidates_.size();
     if (!layer.coefficients.empty()) {
       TESSERA_RETURN_IF_ERROR(
           AddCandidates(layer.coefficients, static_cast<uint32_t>(layers_.layers.size()), context));
     }
     LayerSum sum =
-        sum_.has_value() ? *sum_ : LayerSum(level_.tile_size, num_tiles(), layers_.mean, layers_.scale);
+        sum_.has_value() ? *sum_ : LayerSum(options_.block_side, num_blocks(), layers_.mean, layers_.scale);
     for (size_t c = 0; c < taken_.size(); ++c) {
       const auto codes = brings == Brings::kFinerImages
                              ? Coded(candidates_[taken_[c]].cosines, sum.cosines(c), step).first
-                             : std::vector<int32_t>(num_texels(), 0);
+                             : std::vector<int32_t>(num_btfels(), 0);
       layer.codes.insert(layer.codes.end(), codes.begin(), codes.end());
     }
     std::vector<size_t> taken = taken_;
@@ -354,24 +346,31 @@ class LayerCoder {
       }
     }
     TESSERA_RETURN_IF_ERROR(sum.Add(layer));
-    for (const uint32_t coefficient : layer.coefficients) {
-      held_[coefficient] = true;
-    }
+    const auto hold = [&](bool held) {
+      for (const uint32_t coefficient : layer.coefficients) {
+        held_[coefficient] = held;
+      }
+    };
+    hold(true);
     const double rmse = RmseOf(ReflectedBy(sum), whole_);
-    const bool is_first = result_.rmse.empty();
-    const bool lowers = is_first || rmse < result_.rmse.back();
     // A first layer without coefficients that mean anything would be black.
+    const bool is_first = layers_.layers.empty() && options_.exact.empty();
     const bool is_last_chance = is_first && step / kStepRatio < kLastStep;
-    if (!layer.coefficients.empty() || (lowers && !is_first) || is_last_chance) {
-      taken_ = std::move(taken);
-      sum_ = std::move(sum);
-      layers_.layers.push_back(std::move(layer));
-      result_.rmse.push_back(lowers ? rmse : result_.rmse.back());
+    const bool is_worth_it = is_first ? !layer.coefficients.empty() || is_last_chance : rmse < rmse_;
+    if (!is_worth_it) {
+      hold(false);
+      candidates_.resize(candidates_before);
+      return absl::OkStatus();
     }
+    taken_ = std::move(taken);
+    sum_ = std::move(sum);
+    layers_.layers.push_back(std::move(layer));
+    rmse_ = rmse;
+    result_.rmse.push_back(rmse);
     return absl::OkStatus();
   }
 
-  // What the sampled texels reflect: coefficients that are not here have no entries, and reflect nothing.
+  // What the sampled BTFels reflect: coefficients that are not here have no entries, and reflect nothing.
   [[nodiscard]] FloatRows ReflectedBy(const LayerSum& sum) const {
     FloatRows values = sum.Coefficients(sampled_);
     for (uint32_t c = 0; c < held_.size(); ++c) {
@@ -379,12 +378,16 @@ class LayerCoder {
         values.col(c).setZero();
       }
     }
+    for (const uint32_t c : options_.exact) {
+      values.col(c) = values_.col(c).array() + layers_.mean[c];
+    }
     return values * error_weights_.transpose();
   }
 
-  const TileSet& level_;
-  std::vector<TileFrequency> frequencies_;
-  TileCosines transform_;
+  const BtfelTable& table_;
+  SetLayersOptions options_;
+  std::vector<BlockFrequency> frequencies_;
+  BlockCosines transform_;
   std::optional<CoefficientTables> tables_;
   std::vector<uint32_t> sampled_;
   FloatRows weights_;        // [3 * cases][k], over the root of their number
@@ -398,14 +401,15 @@ class LayerCoder {
   std::vector<size_t> taken_;          // [component], the candidate that it is
   std::optional<LayerSum> sum_;
   TileSetLayers layers_;
-  LevelLayers result_;
+  double rmse_;
+  SetLayers result_;
 };
 
 }  // namespace
 
-absl::StatusOr<LevelLayers> MakeLevelLayers(const TileSet& level, SceneLight light,
-                                            const RunContext& context) {
-  TESSERA_ASSIGN_OR_RETURN(LayerCoder coder, LayerCoder::Create(level, light, context));
+absl::StatusOr<SetLayers> MakeSetLayers(const BtfelTable& table, const SetLayersOptions& options,
+                                        const RunContext& context) {
+  TESSERA_ASSIGN_OR_RETURN(LayerCoder coder, LayerCoder::Create(table, options, context));
   return coder.Run(context);
 }
 
