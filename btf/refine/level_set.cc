@@ -200,6 +200,11 @@ absl::StatusOr<LevelSet> MakeLevelSet(const TileSet& tile_set, int level, const 
   far.radiometry = tile_set.radiometry;
   if (mips.parts_per_texel == 1) {
     far.btfels = from.btfels.WithoutCodes();
+    if (from.parts.size() > kMostMipBytes / from.btfels.num_coefficients) {
+      return absl::ResourceExhaustedError(absl::StrCat("a level of ", from.parts.size(), " texels of ",
+                                                       from.btfels.num_coefficients,
+                                                       " coefficients: at most ", kMostMipBytes, " bytes"));
+    }
     std::vector<uint8_t> codes;
     codes.reserve(from.parts.size() * from.btfels.num_coefficients);
     for (const MipPart& part : from.parts) {

@@ -31,7 +31,7 @@ struct LevelSet {
 };
 
 // Cost: MakeTileMips. Errors: its; INVALID_ARGUMENT naming a level that the tile size does not have;
-// RESOURCE_EXHAUSTED naming kMostTurnedCoefficients; CANCELLED.
+// RESOURCE_EXHAUSTED naming kMostTurnedCoefficients, or the 1 GiB that its texels would pass; CANCELLED.
 [[nodiscard]] absl::StatusOr<LevelSet> MakeLevelSet(const TileSet& tile_set, int level,
                                                     const RunContext& context);
 

@@ -45,7 +45,7 @@ constexpr double kBytesPerEntry = 0.5;
 constexpr double kBytesPerComponent = 16.0;
 constexpr size_t kRows = 1024;
 
-// The principal components of some coefficients, at most kMostComponents.
+// The principal components of some coefficients.
 struct Components {
   FloatRows project;        // [coefficients][components]
   FloatRows basis;          // [components][coefficients]
@@ -60,18 +60,19 @@ FloatRows ColumnsOf(const FloatRows& from, std::span<const uint32_t> columns) {
   return to;
 }
 
-// `values` [texels][coefficients] have a mean of 0, `weights` is [cases][coefficients].
-Components PrincipalComponents(const FloatRows& values, const FloatRows& weights) {
+// At most `most` components. `values` [BTFels][coefficients] have a mean of 0, `weights` is
+// [cases][coefficients].
+Components PrincipalComponents(const FloatRows& values, const FloatRows& weights, size_t most) {
   const FloatRows reflected = values * weights.transpose();
   BlockLanczos lanczos(reflected.cols(), std::min(kBlockComponents, reflected.cols()), /*seed=*/1);
   for (int i = 0; i < kBlocks && !lanczos.is_complete(); ++i) {
     const Eigen::MatrixXf product = reflected.transpose() * (reflected * lanczos.block());
     lanczos.Add(product);
   }
-  const SingularSpace leading = lanczos.Leading(kMostComponents);
+  const SingularSpace leading = lanczos.Leading(static_cast<Eigen::Index>(most));
   Eigen::Index count = 0;
-  const double texels = std::max<double>(1.0, static_cast<double>(values.rows()));
-  while (count < leading.values.size() && leading.values[count] > kLastStep * std::sqrt(texels)) {
+  const double rows = std::max<double>(1.0, static_cast<double>(values.rows()));
+  while (count < leading.values.size() && leading.values[count] > kLastStep * std::sqrt(rows)) {
     ++count;
   }
   Components components;
@@ -81,7 +82,7 @@ Components PrincipalComponents(const FloatRows& values, const FloatRows& weights
   for (Eigen::Index c = 0; c < count; ++c) {
     const float squares = std::max(images.col(c).squaredNorm(), 1e-30F);
     components.basis.row(c) /= squares;
-    components.size.push_back(std::sqrt(squares / static_cast<float>(texels)));
+    components.size.push_back(std::sqrt(squares / static_cast<float>(rows)));
   }
   return components;
 }
@@ -128,6 +129,9 @@ class LayerCoder {
 
   [[nodiscard]] size_t num_btfels() const { return table_.size(); }
   [[nodiscard]] size_t num_blocks() const { return table_.size() / frequencies_.size(); }
+  [[nodiscard]] size_t most_components() const {
+    return std::min(kMostLayerComponents, kMostLayerValues / std::max<size_t>(num_btfels(), 1));
+  }
 
   absl::Status Measure() {
     TESSERA_ASSIGN_OR_RETURN(const std::unique_ptr<Decoder> decoder, MakeDecoder(table_));
@@ -255,11 +259,12 @@ class LayerCoder {
     return coefficients;
   }
 
-  // The components of these coefficients, with their images over all texels.
+  // The components of these coefficients, with their images over all BTFels.
   absl::Status AddCandidates(std::span<const uint32_t> coefficients, uint32_t span,
                              const RunContext& context) {
     const Components found =
-        PrincipalComponents(ColumnsOf(values_, coefficients), ColumnsOf(weights_, coefficients));
+        PrincipalComponents(ColumnsOf(values_, coefficients), ColumnsOf(weights_, coefficients),
+                            std::min<size_t>(kMostComponents, most_components()));
     const Eigen::Index count = found.project.cols();
     Eigen::RowVectorXf mean(static_cast<Eigen::Index>(coefficients.size()));
     for (size_t i = 0; i < coefficients.size(); ++i) {
@@ -329,7 +334,7 @@ class LayerCoder {
       layer.codes.insert(layer.codes.end(), codes.begin(), codes.end());
     }
     std::vector<size_t> taken = taken_;
-    for (size_t c = 0; c < candidates_.size() && taken.size() < kMostLayerComponents; ++c) {
+    for (size_t c = 0; c < candidates_.size() && taken.size() < most_components(); ++c) {
       if (brings == Brings::kFinerImages || std::ranges::find(taken_, c) != taken_.end()) {
         continue;
       }

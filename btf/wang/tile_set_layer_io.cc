@@ -135,20 +135,16 @@ absl::StatusOr<TileSetLayer> ReadLayerSections(const Container& container, const
   TESSERA_ASSIGN_OR_RETURN(const std::vector<uint32_t> reach, ReadVector<uint32_t>(container, "reach"));
   const size_t frequencies = sum.num_btfels() / sum.num_blocks();
   const bool too_far = std::ranges::any_of(reach, [frequencies](uint32_t r) { return r > frequencies; });
-  if (components > kMostLayerComponents || reach.size() != components || too_far) {
-    return absl::InvalidArgumentError(absl::StrCat("section 'reach': ", reach.size(), " values, expected ",
-                                                   components, ", at most ", kMostLayerComponents,
-                                                   ", of at most ", frequencies));
+  if (reach.size() != components || too_far || components > kMostLayerValues / sum.num_btfels()) {
+    return absl::InvalidArgumentError(absl::StrCat(
+        "section 'reach': ", reach.size(), " values, expected ", components, " of at most ", frequencies,
+        ", for ", sum.num_btfels(), " BTFels at most ", kMostLayerValues / sum.num_btfels()));
   }
   size_t count = 0;
   for (const uint32_t frequency : reach) {
     count += frequency * sum.num_blocks();
   }
   TESSERA_ASSIGN_OR_RETURN(const std::vector<int32_t> codes, ReadCodes(container, "codes", count));
-  if (components * sum.num_btfels() > kMaxExpandedBytes / (4 * sizeof(float))) {
-    return absl::InvalidArgumentError(absl::StrCat(components, " components of ", sum.num_btfels(),
-                                                   " BTFels take more than ", kMaxExpandedBytes, " bytes"));
-  }
   layer.codes.assign(components * sum.num_btfels(), 0);
   auto from = codes.begin();
   for (size_t c = 0; c < components; ++c) {

@@ -99,9 +99,11 @@ absl::Status LayerSum::Check(const TileSetLayer& layer) const {
     taken[coefficient] = true;
   }
   const size_t components = spans_.size() + layer.spans.size();
-  if (components > kMostLayerComponents) {
-    return absl::InvalidArgumentError(
-        absl::StrCat("layer's components: ", components, " in all, at most ", kMostLayerComponents));
+  if (components > kMostLayerComponents ||
+      components > kMostLayerValues / std::max<size_t>(num_btfels(), 1)) {
+    return absl::InvalidArgumentError(absl::StrCat("layer's components: ", components, " in all of ",
+                                                   num_btfels(), " BTFels, at most ", kMostLayerComponents,
+                                                   ", and ", kMostLayerValues, " values"));
   }
   size_t basis = 0;
   for (const uint32_t span : layer.spans) {

@@ -1,5 +1,6 @@
-// Coefficients of a tile set as a few images, cosine-transformed tile by tile and quantised in layers: what
-// scenes that are far away receive (refine/level_layers.h makes it, FORMAT.md describes it).
+// Coefficients of a tile set as a few images, cosine-transformed by block and quantised in layers: what most
+// scenes receive of it (refine/set_layers.h makes it, FORMAT.md describes it). A block is s x s BTFels that
+// follow each other: of a mip level, whose texels are BTFels of their own, a tile; of other sets one BTFel.
 //
 // A coefficient is mean[j] + scale[j] * sum over components c of its layer of basis[c][j] * image[c](BTFel):
 // one layer brought it, and components are made of the coefficients of one layer. Each layer brings
@@ -25,6 +26,8 @@
 namespace tessera {
 
 inline constexpr size_t kMostLayerComponents = 256;
+// Components times BTFels: each takes a few numbers in memory.
+inline constexpr size_t kMostLayerValues = size_t{1} << 26;
 
 using FloatRows = Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 

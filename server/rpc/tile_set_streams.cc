@@ -43,6 +43,16 @@ uint64_t SizeOf(const TileSet& tile_set) {
   return bytes;
 }
 
+uint64_t SizeOf(const TileSetCut& cut) {
+  uint64_t bytes = 0;
+  if (cut.layers != nullptr) {
+    for (const TileSetLayer& layer : cut.layers->layers) {
+      bytes += sizeof(int32_t) * (layer.codes.size() + layer.basis.size());
+    }
+  }
+  return bytes;
+}
+
 absl::Status BeyondBytes(const std::string& message) {
   return WithReason(absl::FailedPreconditionError(message), "BOUND_NOT_REACHED", "max_bytes");
 }
@@ -158,7 +168,8 @@ void TileSetStreams::DropUnused() {
   // Parts go before what they are cut from.
   std::erase_if(sources_, [&](const std::shared_ptr<const Source>& source) {
     return source != sources_.front() &&
-           !keeps(counted.insert(source->tile_set.get()).second ? SizeOf(*source->tile_set) : 0);
+           !keeps(SizeOf(source->refinement.cut) +
+                  (counted.insert(source->tile_set.get()).second ? SizeOf(*source->tile_set) : 0));
   });
   std::erase_if(cuts_, [&](const std::shared_ptr<Cut>& cut) {
     uint64_t bytes = 0;

@@ -106,7 +106,7 @@ TEST(LayerSumTest, RefusesWhatDoesNotFitAndStaysWhatItWas) {
   refused([](TileSetLayer& layer) { layer.codes.pop_back(); }, "7 of 8");
   refused([](TileSetLayer& layer) { layer.basis = {1}; }, "1 of 0");
   refused([](TileSetLayer& layer) { layer.spans.assign(kMostLayerComponents, 0); },
-          "257 in all, at most 256");
+          "257 in all of 8 BTFels, at most 256");
   EXPECT_TRUE(sum.Add(next).ok());
 }
 
