@@ -5,12 +5,15 @@
 #include <string>
 #include <vector>
 
+#include <Eigen/Core>
+
 #include "btf/codec/btfel_table.h"
 #include "btf/codec/decoder.h"
 #include "btf/codec/scene_light.h"
-#include "btf/wang/tile_set_layers.h"
 
 namespace tessera {
+
+using FloatRows = Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
 inline constexpr int kRefineViews = 96;
 // BTFels over which errors are measured.

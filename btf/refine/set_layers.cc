@@ -377,7 +377,8 @@ class LayerCoder {
 
   // What the sampled BTFels reflect: coefficients that are not here have no entries, and reflect nothing.
   [[nodiscard]] FloatRows ReflectedBy(const LayerSum& sum) const {
-    FloatRows values = sum.Coefficients(sampled_);
+    const std::vector<float> sums = sum.Coefficients(sampled_);
+    FloatRows values = Eigen::Map<const FloatRows>(sums.data(), values_.rows(), values_.cols());
     for (uint32_t c = 0; c < held_.size(); ++c) {
       if (!held_[c]) {
         values.col(c).setZero();

@@ -389,27 +389,31 @@ void TileSetAssembler::Quantize() {
       body(begin, layers_->Coefficients(btfels));
     }
   };
-  Eigen::RowVectorXf low = Eigen::RowVectorXf::Constant(table.num_coefficients, INFINITY);
-  Eigen::RowVectorXf high = -low;
-  for_rows([&](size_t, const FloatRows& values) {
-    low = low.cwiseMin(values.colwise().minCoeff());
-    high = high.cwiseMax(values.colwise().maxCoeff());
+  std::vector<float> low(k, INFINITY);
+  std::vector<float> high(k, -INFINITY);
+  for_rows([&](size_t, const std::vector<float>& values) {
+    for (size_t row = 0; row < values.size(); row += k) {
+      for (size_t i = 0; i < k; ++i) {
+        low[i] = std::min(low[i], values[row + i]);
+        high[i] = std::max(high[i], values[row + i]);
+      }
+    }
   });
-  Quantisation quantisation = UniformQuantisation(std::span(low.data(), k), std::span(high.data(), k));
-  std::vector<uint8_t> codes(kRows * k);
-  std::vector<bool> is_exact(k, false);
+  Quantisation quantisation = UniformQuantisation(low, high);
   for (const uint32_t coefficient : exact_) {
-    is_exact[coefficient] = true;
     quantisation.offset[coefficient] = table.offset[coefficient];
     quantisation.step[coefficient] = table.step[coefficient];
   }
-  for_rows([&](size_t begin, const FloatRows& values) {
-    const auto count = static_cast<size_t>(values.size());
-    tessera::Quantize(quantisation, std::span(values.data(), count), std::span(codes).first(count));
+  std::vector<uint8_t> codes(kRows * k);
+  for_rows([&](size_t begin, const std::vector<float>& values) {
+    tessera::Quantize(quantisation, values, std::span(codes).first(values.size()));
     uint8_t* const to = table.codes.data() + begin * k;
-    for (size_t i = 0; i < count; ++i) {
-      to[i] = is_exact[i % k] ? to[i] : codes[i];
+    for (size_t row = 0; row < values.size(); row += k) {
+      for (const uint32_t coefficient : exact_) {
+        codes[row + coefficient] = to[row + coefficient];
+      }
     }
+    std::copy_n(codes.begin(), values.size(), to);
   });
   table.offset = std::move(quantisation.offset);
   table.step = std::move(quantisation.step);

@@ -6,11 +6,17 @@
 #include <utility>
 
 #include <absl/strings/str_cat.h>
+#include <Eigen/Core>
 
 #include "btf/base/status_macros.h"
 #include "btf/math/conventions.h"
 
 namespace tessera {
+namespace {
+
+using Rows = Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+
+}  // namespace
 
 std::vector<BlockFrequency> BlockFrequencies(int block_side) {
   std::vector<BlockFrequency> frequencies;
@@ -29,12 +35,11 @@ float StepFactor(const BlockFrequency& frequency, int block_side) {
   return 2 * std::max(frequency.u, frequency.v) >= block_side && block_side > 1 ? 2.0F : 1.0F;
 }
 
-BlockCosines::BlockCosines(int block_side)
-    : matrix_(block_side, block_side), frequencies_(BlockFrequencies(block_side)) {
+BlockCosines::BlockCosines(int block_side) : side_(block_side), frequencies_(BlockFrequencies(block_side)) {
   for (int u = 0; u < block_side; ++u) {
     const double norm = std::sqrt((u == 0 ? 1.0 : 2.0) / block_side);
     for (int x = 0; x < block_side; ++x) {
-      matrix_(u, x) = static_cast<float>(norm * std::cos(kPi * (2 * x + 1) * u / (2 * block_side)));
+      matrix_.push_back(static_cast<float>(norm * std::cos(kPi * (2 * x + 1) * u / (2 * block_side))));
     }
   }
 }
@@ -44,11 +49,11 @@ std::vector<float> BlockCosines::Forward(std::span<const float> image) const {
   if (frequencies_.size() == 1) {
     return cosines;
   }
+  const Eigen::Map<const Rows> matrix(matrix_.data(), side_, side_);
   const size_t num_blocks = image.size() / frequencies_.size();
   for (size_t block = 0; block < num_blocks; ++block) {
-    const Eigen::Map<const FloatRows> from(image.data() + block * frequencies_.size(), matrix_.rows(),
-                                           matrix_.cols());
-    const FloatRows transformed = matrix_ * from * matrix_.transpose();
+    const Eigen::Map<const Rows> from(image.data() + block * frequencies_.size(), side_, side_);
+    const Rows transformed = matrix * from * matrix.transpose();
     for (size_t f = 0; f < frequencies_.size(); ++f) {
       cosines[f * num_blocks + block] = transformed(frequencies_[f].v, frequencies_[f].u);
     }
@@ -61,14 +66,15 @@ std::vector<float> BlockCosines::Back(std::span<const float> cosines) const {
   if (frequencies_.size() == 1) {
     return image;
   }
+  const Eigen::Map<const Rows> matrix(matrix_.data(), side_, side_);
   const size_t num_blocks = cosines.size() / frequencies_.size();
-  FloatRows from(matrix_.rows(), matrix_.cols());
+  Rows from(side_, side_);
   for (size_t block = 0; block < num_blocks; ++block) {
     for (size_t f = 0; f < frequencies_.size(); ++f) {
       from(frequencies_[f].v, frequencies_[f].u) = cosines[f * num_blocks + block];
     }
-    Eigen::Map<FloatRows>(image.data() + block * frequencies_.size(), matrix_.rows(), matrix_.cols()) =
-        matrix_.transpose() * from * matrix_;
+    Eigen::Map<Rows>(image.data() + block * frequencies_.size(), side_, side_) =
+        matrix.transpose() * from * matrix;
   }
   return image;
 }
@@ -172,11 +178,11 @@ float LayerSum::Bound() const {
   return bound;
 }
 
-FloatRows LayerSum::Coefficients(std::span<const uint32_t> btfels) const {
+std::vector<float> LayerSum::Coefficients(std::span<const uint32_t> btfels) const {
   const auto rows = static_cast<Eigen::Index>(btfels.size());
   const auto k = static_cast<Eigen::Index>(mean_.size());
-  FloatRows images(rows, static_cast<Eigen::Index>(spans_.size()));
-  FloatRows basis = FloatRows::Zero(images.cols(), k);
+  Rows images(rows, static_cast<Eigen::Index>(spans_.size()));
+  Rows basis = Rows::Zero(images.cols(), k);
   for (size_t c = 0; c < spans_.size(); ++c) {
     const auto component = static_cast<Eigen::Index>(c);
     for (size_t i = 0; i < btfels.size(); ++i) {
@@ -187,8 +193,10 @@ FloatRows LayerSum::Coefficients(std::span<const uint32_t> btfels) const {
       basis(component, columns[i]) = basis_[c][i];
     }
   }
-  FloatRows values = Eigen::Map<const Eigen::RowVectorXf>(mean_.data(), k).replicate(rows, 1);
-  values.noalias() += images * basis;
+  std::vector<float> values(btfels.size() * mean_.size());
+  Eigen::Map<Rows> map(values.data(), rows, k);
+  map = Eigen::Map<const Eigen::RowVectorXf>(mean_.data(), k).replicate(rows, 1);
+  map.noalias() += images * basis;
   return values;
 }
 

@@ -8,7 +8,7 @@
 //
 //   LayerSum sum(block_side, num_blocks, mean, scale);
 //   TESSERA_RETURN_IF_ERROR(sum.Add(layer));       // again and again
-//   FloatRows values = sum.Coefficients(btfels);   // [btfels][k]
+//   std::vector<float> values = sum.Coefficients(btfels);   // [btfels][k]
 #pragma once
 
 #include <cstddef>
@@ -19,7 +19,6 @@
 #include <vector>
 
 #include <absl/status/status.h>
-#include <Eigen/Core>
 
 #include "btf/codec/btfel_table.h"
 
@@ -28,8 +27,6 @@ namespace tessera {
 inline constexpr size_t kMostLayerComponents = 256;
 // Components times BTFels: each takes a few numbers in memory.
 inline constexpr size_t kMostLayerValues = size_t{1} << 26;
-
-using FloatRows = Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
 struct TileSetLayer {
   // Of the images' cosine coefficients; twice as long for those of the upper half of the frequencies across
@@ -74,7 +71,8 @@ class BlockCosines {
   [[nodiscard]] std::vector<float> Back(std::span<const float> cosines) const;
 
  private:
-  FloatRows matrix_;
+  int side_;
+  std::vector<float> matrix_;  // [u][x]
   std::vector<BlockFrequency> frequencies_;
 };
 
@@ -99,7 +97,7 @@ class LayerSum {
   // No coefficient is larger than this.
   [[nodiscard]] float Bound() const;
   // [btfels][k]. Finite where Bound() is.
-  [[nodiscard]] FloatRows Coefficients(std::span<const uint32_t> btfels) const;
+  [[nodiscard]] std::vector<float> Coefficients(std::span<const uint32_t> btfels) const;
 
  private:
   [[nodiscard]] absl::Status Check(const TileSetLayer& layer) const;

@@ -145,14 +145,12 @@ void AddPull(CLI::App& noun, Session& session) {
                    "Only the coarsest mip level from which quads so many pixels wide look as from all")
       ->excludes(level);
   command->add_option("--max-error", flags->max_error,
-                      "Only the coefficients that it takes: RMSE in reflectance against all of them");
+                      "Only as much as it takes: RMSE in reflectance against all of it");
   command
       ->add_option("--max-bytes", flags->max_bytes,
                    "Only as many as fit in these bytes, or with a unit: 400KB, 2MiB")
       ->transform(CLI::AsSizeValue(/*kb_is_1000=*/true));
-  command
-      ->add_option("--light", flags->light,
-                   "Light of the scene, for errors and the order of coefficients [point]")
+  command->add_option("--light", flags->light, "Light of the scene, for errors and what comes first [point]")
       ->check(CLI::IsMember({"point", "environment"}));
   command->callback(
       [&session, flags] { session.run = [&session, flags] { return RunPull(session, *flags); }; });

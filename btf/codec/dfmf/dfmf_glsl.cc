@@ -27,10 +27,9 @@ int Groups(int count) {
   return (count + kGroup - 1) / kGroup;
 }
 
-// Where things lie. `codec_values`: the limits, the three colour axes, then for each group the scales of even
-// and of odd factors and their offsets. `codec_words`: for each pair of nodes a texel for each group,
-// luminance first, then either chrominance. `btfel_words`: for each BTFel a texel for each group of
-// coefficients.
+// Where things lie. `codec_values`: the limits, the three colour axes, then for each group the scale and the
+// offset of its factors. `codec_words`: for each pair of nodes a texel for each group, luminance first, then
+// either chrominance. `btfel_words`: for each BTFel a texel for each group of coefficients.
 struct Layout {
   int luma_groups = 0;
   int chroma_groups = 0;
@@ -74,9 +73,10 @@ void FindNodes(vec3 d, float by_covered, int side, out ivec3 nodes, out vec3 wei
                    : (low ? vec3(1.0 - f - g, f, g) : vec3(f + g - 1.0, 1.0 - g, 1.0 - f));
 }
 
-// The signed 16-bit codes of four words, the lower ones 2^16 times too high, which saves moving them down.
+// The signed 16-bit codes of four words, low + 2^16 high, 2^16 times too high, which saves moving them down. The higher
+// ones are off by what the lower ones are of 2^16: half a step at most.
 vec4 Low(uvec4 u) { return vec4(ivec4(u << 16)); }
-vec4 High(uvec4 u) { return vec4(ivec4(u) >> 16); }
+vec4 High(uvec4 u) { return vec4(ivec4(u)); }
 )";
 
 // The factors of group `group`: even ones in `even`, odd ones in `odd`.
@@ -94,7 +94,7 @@ std::string Interpolate(const std::string& group, const std::string& suffix) {
   }
   absl::StrAppend(&out,
                   absl::Substitute("    q = texelFetch(codec_values, 4 + $0);\n    even$1 = even$1 * q.x "
-                                   "+ q.z; odd$1 = odd$1 * q.y + q.w;\n",
+                                   "+ q.y; odd$1 = odd$1 * q.x + q.y;\n",
                                    group, suffix));
   return out;
 }
@@ -157,8 +157,9 @@ vec3 BlendUnturned(ivec4 btfels, vec4 weights, int count, Incidence light, vec3 
   return out;
 }
 
-// Even codes times even factors, both 2^16 times too high, are to come out as odd ones do.
-constexpr char kScaleEvenCodes[] = "    even_codes *= 2.3283064365386963e-10;\n";
+// Codes times factors, both 2^16 times too high.
+constexpr char kScaleCodes[] =
+    "    even_codes *= 2.3283064365386963e-10; odd_codes *= 2.3283064365386963e-10;\n";
 
 // Adds to the colour `sum` what the blended codes of group `group` are under each of `n` harmonics.
 std::string AddUnderHarmonics(const std::string& group, const std::string& sum, int n) {
@@ -198,11 +199,11 @@ vec3 BlendUnturned(ivec4 btfels, vec4 weights, int count, Incidence light, vec3 
   do {
 )",
                        layout.view_nodes, layout.num_groups() * n),
-      BlendCodes("g", layout.btfel_texels()), kScaleEvenCodes, AddUnderHarmonics("g", "luma", n),
+      BlendCodes("g", layout.btfel_texels()), kScaleCodes, AddUnderHarmonics("g", "luma", n),
       "  } while (++g < ", layout.luma_groups, ");\n");
   if (layout.chroma_groups > 0) {
     const std::string first = absl::StrCat("g + ", layout.luma_groups);
-    absl::StrAppend(&out, "  g = 0;\n  do {\n", BlendCodes(first, layout.btfel_texels()), kScaleEvenCodes,
+    absl::StrAppend(&out, "  g = 0;\n  do {\n", BlendCodes(first, layout.btfel_texels()), kScaleCodes,
                     AddUnderHarmonics(first, "first_chroma", n),
                     AddUnderHarmonics(absl::StrCat("g + ", layout.luma_groups + layout.chroma_groups),
                                       "second_chroma", n),
@@ -218,9 +219,10 @@ vec3 BlendUnturned(ivec4 btfels, vec4 weights, int count, Incidence light, vec3 
   return out;
 }
 
-// The nearest signed code, as the low half of a word.
-uint32_t Code16(float value) {
-  return static_cast<uint16_t>(static_cast<int>(std::clamp(std::round(value), -kMostCode, kMostCode)));
+// Adds the nearest signed code to a word, as its lower half where `place` is even, else times 2^16.
+void AddCode(float value, size_t place, uint32_t& word) {
+  const auto code = static_cast<int>(std::clamp(std::round(value), -kMostCode, kMostCode));
+  word += static_cast<uint32_t>(code) << (16 * (place % 2));
 }
 
 // Factors of one group in the order of the table: the first, their number, the first coefficient they
@@ -268,16 +270,14 @@ void PackFactors(const DfmfDecoder& decoder, std::span<const float> scales, cons
     const float middle = 0.5F * (high + low);
     const float inverse = scale > 0.0F ? 1.0F / scale : 0.0F;
     float* const quantisation = &glsl.shared_values[4 * (4 + g)];
-    // Even codes, of factors and of BTFels, stand 2^16 times too high.
+    // Codes, of factors and of BTFels, stand 2^16 times too high.
     quantisation[0] = scale / 65536.0F / 65536.0F;
-    quantisation[1] = scale;
-    quantisation[2] = middle / 65536.0F;
-    quantisation[3] = middle;
+    quantisation[1] = middle / 65536.0F;
     for (size_t pair = 0; pair < layout.num_pairs(); ++pair) {
       uint32_t* const words = glsl.shared_words.data() + (pair * groups.size() + g) * 4;
       for (int i = 0; i < group.count; ++i) {
         const float w = grid[pair * num_factors + group.factor + i] * scales[group.coefficient + i];
-        words[i / 2] |= Code16((w - middle) * inverse) << (16 * (i % 2));
+        AddCode((w - middle) * inverse, static_cast<size_t>(i), words[i / 2]);
       }
     }
   }
@@ -312,7 +312,7 @@ void PackFactorsUnderHarmonics(const DfmfDecoder& decoder, std::span<const float
       for (int view = 0; view < num_views; ++view) {
         uint32_t* const words = glsl.words.data() + ((view * groups.size() + g) * n + i) * 4;
         for (int f = 0; f < group.count; ++f) {
-          words[f / 2] |= Code16(factor(view, f) * inverse) << (16 * (f % 2));
+          AddCode(factor(view, f) * inverse, static_cast<size_t>(f), words[f / 2]);
         }
       }
     }
@@ -337,7 +337,7 @@ uint32_t* PackBtfels(const BtfelTable& table, std::span<const float> scales, siz
           i < luma_rank ? i : static_cast<size_t>(layout.luma_groups) * kGroup + (i - luma_rank);
       const float value = table.offset[i] + table.step[i] * static_cast<float>(codes[i]);
       const float code = scales[i] > 0.0F ? value / scales[i] : 0.0F;
-      words[place / 2] |= Code16(code) << (16 * (place % 2));
+      AddCode(code, place, words[place / 2]);
     }
     words += static_cast<ptrdiff_t>(layout.btfel_texels()) * 4;
   }

@@ -1,5 +1,6 @@
 #include "btf/wang/tile_set_layers.h"
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <numeric>
@@ -7,6 +8,7 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <Eigen/Core>
 
 #include "btf/math/conventions.h"
 
@@ -60,14 +62,14 @@ TEST(LayerSumTest, IsMeanAndBasisTimesImages) {
   ASSERT_TRUE(sum.Add(FirstLayer()).ok());
   std::vector<uint32_t> btfels(8);
   std::iota(btfels.begin(), btfels.end(), 0u);
-  const FloatRows values = sum.Coefficients(btfels);
+  const std::vector<float> values = sum.Coefficients(btfels);
   // Block 0: a constant of 6 * 0.5 / 2. Block 1: 2 * 0.5 / 2, and a cosine of 1 * 0.5 * 2 across, +-0.5 a
   // texel.
   const std::vector<float> image = {1.5F, 1.5F, 1.5F, 1.5F, 1.0F, 0.0F, 1.0F, 0.0F};
   for (int btfel = 0; btfel < 8; ++btfel) {
-    EXPECT_NEAR(values(btfel, 0), 1.0F + 1.0F * image[btfel], 1e-6F) << btfel;
-    EXPECT_EQ(values(btfel, 1), 10.0F);
-    EXPECT_NEAR(values(btfel, 2), 100.0F - 4.0F * image[btfel], 1e-5F) << btfel;
+    EXPECT_NEAR(values[3 * btfel + 0], 1.0F + 1.0F * image[btfel], 1e-6F) << btfel;
+    EXPECT_EQ(values[3 * btfel + 1], 10.0F);
+    EXPECT_NEAR(values[3 * btfel + 2], 100.0F - 4.0F * image[btfel], 1e-5F) << btfel;
   }
   // A second layer makes the image finer, and brings coefficient 1.
   TileSetLayer second{.step = 0.125F, .coefficients = {1}, .spans = {1}, .basis_step = {1.0F}, .basis = {1}};
@@ -75,11 +77,11 @@ TEST(LayerSumTest, IsMeanAndBasisTimesImages) {
   second.codes[0] = -1;
   second.codes[8] = 16;
   ASSERT_TRUE(sum.Add(second).ok());
-  const FloatRows finer = sum.Coefficients(btfels);
-  EXPECT_NEAR(finer(3, 0), 1.0F + 1.5F - 0.0625F, 1e-6F);
-  EXPECT_NEAR(finer(3, 1), 11.0F, 1e-6F);
-  EXPECT_NEAR(finer(4, 1), 10.0F, 1e-6F);
-  EXPECT_GE(sum.Bound(), finer.maxCoeff());
+  const std::vector<float> finer = sum.Coefficients(btfels);
+  EXPECT_NEAR(finer[3 * 3 + 0], 1.0F + 1.5F - 0.0625F, 1e-6F);
+  EXPECT_NEAR(finer[3 * 3 + 1], 11.0F, 1e-6F);
+  EXPECT_NEAR(finer[3 * 4 + 1], 10.0F, 1e-6F);
+  EXPECT_GE(sum.Bound(), *std::ranges::max_element(finer));
   EXPECT_LE(sum.Bound(), 120.0F);
 }
 

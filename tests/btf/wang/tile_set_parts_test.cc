@@ -238,14 +238,14 @@ TEST(TileSetPartsTest, LayersAddUpToTheirSum) {
       ASSERT_EQ(got.btfels.size(), 64 * (tiles.empty() ? 26 : tiles.size()));
       for (const uint32_t tile : {4u, 20u}) {
         for (int texel = 0; texel < 64; ++texel) {
-          const FloatRows expected =
+          const std::vector<float> expected =
               sum.Coefficients(std::vector<uint32_t>{tile * 64 + static_cast<uint32_t>(texel)});
           const uint32_t packed = got.tile_index[tile * 64 + texel];
           EXPECT_EQ(TurnsOfTexel(packed), TurnsOfTexel(tile_set.tile_index[tile * 64 + texel]));
           for (int i = 0; i < 12; ++i) {
             const float value =
                 got.btfels.offset[i] + got.btfels.step[i] * got.btfels.btfel(BtfelOfTexel(packed))[i];
-            ASSERT_NEAR(value, expected(0, i), 0.501F * got.btfels.step[i] + 1e-4F)
+            ASSERT_NEAR(value, expected[i], 0.501F * got.btfels.step[i] + 1e-4F)
                 << part << " " << tile << " " << i;
           }
         }
