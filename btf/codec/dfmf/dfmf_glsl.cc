@@ -157,28 +157,22 @@ vec3 BlendUnturned(ivec4 btfels, vec4 weights, int count, Incidence light, vec3 
   return out;
 }
 
-// Codes times factors, both 2^16 times too high.
-constexpr char kScaleCodes[] =
-    "    even_codes *= 2.3283064365386963e-10; odd_codes *= 2.3283064365386963e-10;\n";
-
 // Adds to the colour `sum` what the blended codes of group `group` are under each of `n` harmonics.
 std::string AddUnderHarmonics(const std::string& group, const std::string& sum, int n) {
-  std::string out = absl::Substitute("    at = words + ($0) * $1;\n", group, n);
+  std::string out = absl::Substitute("    at = words + ($0) * $1;\n    of_group = vec3(0.0);\n", group, n);
   for (int i = 0; i < n; ++i) {
-    if (i % 4 == 0) {
-      absl::StrAppend(&out, absl::Substitute("    q = texelFetch(harmonics_values, ($0) * $1 + $2);\n", group,
-                                             (n + 3) / 4, i / 4));
-    }
     absl::StrAppend(&out, absl::Substitute(R"(    u0 = texelFetch(harmonics_words, at.x + $0);
     u1 = texelFetch(harmonics_words, at.y + $0);
     u2 = texelFetch(harmonics_words, at.z + $0);
     at_nodes = vec3(dot(Low(u0), even_codes) + dot(High(u0), odd_codes),
                     dot(Low(u1), even_codes) + dot(High(u1), odd_codes),
                     dot(Low(u2), even_codes) + dot(High(u2), odd_codes));
-    $1 += (q[$2] * dot(view_weights, at_nodes)) * light[$0];
+    of_group += dot(view_weights, at_nodes) * light[$0];
 )",
-                                           i, sum, i % 4));
+                                           i));
   }
+  absl::StrAppend(&out,
+                  absl::Substitute("    $0 += texelFetch(harmonics_values, $1).x * of_group;\n", sum, group));
   return out;
 }
 
@@ -190,20 +184,19 @@ std::string SourceOfHarmonics(const Layout& layout, int n) {
 vec3 BlendUnturned(ivec4 btfels, vec4 weights, int count, Incidence light, vec3 view) {
   bool is_lit = view.z > 0.0 && count > 0;
   ivec3 view_nodes, at;
-  vec3 view_weights, at_nodes, luma = vec3(0.0), first_chroma = vec3(0.0), second_chroma = vec3(0.0);
+  vec3 view_weights, at_nodes, of_group, luma = vec3(0.0), first_chroma = vec3(0.0), second_chroma = vec3(0.0);
   FindNodes(view, texelFetch(codec_values, 0).z, $0, view_nodes, view_weights);
   ivec3 words = view_nodes * $1;
   uvec4 u, u0, u1, u2;
-  vec4 q;
   int n, g = 0;
   do {
 )",
                        layout.view_nodes, layout.num_groups() * n),
-      BlendCodes("g", layout.btfel_texels()), kScaleCodes, AddUnderHarmonics("g", "luma", n),
-      "  } while (++g < ", layout.luma_groups, ");\n");
+      BlendCodes("g", layout.btfel_texels()), AddUnderHarmonics("g", "luma", n), "  } while (++g < ",
+      layout.luma_groups, ");\n");
   if (layout.chroma_groups > 0) {
     const std::string first = absl::StrCat("g + ", layout.luma_groups);
-    absl::StrAppend(&out, "  g = 0;\n  do {\n", BlendCodes(first, layout.btfel_texels()), kScaleCodes,
+    absl::StrAppend(&out, "  g = 0;\n  do {\n", BlendCodes(first, layout.btfel_texels()),
                     AddUnderHarmonics(first, "first_chroma", n),
                     AddUnderHarmonics(absl::StrCat("g + ", layout.luma_groups + layout.chroma_groups),
                                       "second_chroma", n),
@@ -283,7 +276,7 @@ void PackFactors(const DfmfDecoder& decoder, std::span<const float> scales, cons
   }
 }
 
-// Of each view node, group and harmonic the factors, and what one step of their codes is worth.
+// Of each view node, group and harmonic the factors, and what one step of a group's codes is worth.
 void PackFactorsUnderHarmonics(const DfmfDecoder& decoder, std::span<const float> scales, int n,
                                HarmonicsGlsl& glsl) {
   const std::vector<Group> groups = GroupsOf(decoder);
@@ -292,27 +285,29 @@ void PackFactorsUnderHarmonics(const DfmfDecoder& decoder, std::span<const float
   for (int view = 0; view < num_views; ++view) {
     factors[view] = decoder.FactorsUnderHarmonics({{view, view, view}, {1.0, 0.0, 0.0}}, n);
   }
-  const size_t row = (static_cast<size_t>(n) + 3) / 4 * 4;
-  glsl.values.assign(groups.size() * row, 0.0F);
+  glsl.values.assign(4 * groups.size(), 0.0F);
   glsl.words.assign(num_views * groups.size() * n * 4, 0);
   for (size_t g = 0; g < groups.size(); ++g) {
     const Group& group = groups[g];
-    for (int i = 0; i < n; ++i) {
-      const auto factor = [&](int view, int f) {
-        return static_cast<float>(factors[view](group.factor + f, i)) * scales[group.coefficient + f];
-      };
-      float most = 0.0F;
-      for (int view = 0; view < num_views; ++view) {
+    const auto factor = [&](int view, int i, int f) {
+      return static_cast<float>(factors[view](group.factor + f, i)) * scales[group.coefficient + f];
+    };
+    float most = 0.0F;
+    for (int view = 0; view < num_views; ++view) {
+      for (int i = 0; i < n; ++i) {
         for (int f = 0; f < group.count; ++f) {
-          most = std::max(most, std::abs(factor(view, f)));
+          most = std::max(most, std::abs(factor(view, i, f)));
         }
       }
-      glsl.values[g * row + i] = most / kMostCode;
-      const float inverse = most > 0.0F ? kMostCode / most : 0.0F;
-      for (int view = 0; view < num_views; ++view) {
+    }
+    // Codes, of factors and of BTFels, stand 2^16 times too high.
+    glsl.values[4 * g] = most / kMostCode / 65536.0F / 65536.0F;
+    const float inverse = most > 0.0F ? kMostCode / most : 0.0F;
+    for (int view = 0; view < num_views; ++view) {
+      for (int i = 0; i < n; ++i) {
         uint32_t* const words = glsl.words.data() + ((view * groups.size() + g) * n + i) * 4;
         for (int f = 0; f < group.count; ++f) {
-          AddCode(factor(view, f) * inverse, static_cast<size_t>(f), words[f / 2]);
+          AddCode(factor(view, i, f) * inverse, static_cast<size_t>(f), words[f / 2]);
         }
       }
     }

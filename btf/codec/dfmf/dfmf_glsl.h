@@ -18,9 +18,8 @@ namespace tessera {
 [[nodiscard]] absl::StatusOr<CodecGlsl> DfmfGlsl(const BtfelTable& table,
                                                  std::span<const BtfelTable* const> more = {});
 
-// Beside it, for light of `n` harmonics. Factors at nodes of the views are packed to 16 bits, with a scale
-// for each harmonic of eight of them. Cost: a product with each harmonic for each pair of nodes. Errors: the
-// same.
+// Beside it, for light of `n` harmonics. Factors at nodes of the views are packed to 16 bits, with one
+// scale for eight of them. Cost: a product with each harmonic for each pair of nodes. Errors: the same.
 [[nodiscard]] absl::StatusOr<HarmonicsGlsl> DfmfHarmonicsGlsl(const BtfelTable& table,
                                                               std::span<const BtfelTable* const> more, int n);
 
