@@ -69,7 +69,7 @@ function(tessera_executable name)
 endfunction()
 
 # tessera_test(NAME LABELS unit|gl|e2e|slow.. SOURCES a_test.cc.. PRIVATE lib.. [TIMEOUT seconds])
-# One executable per folder; each TEST() is a CTest test of its own. Compiled in half the time with -O1: what takes long
+# One executable per folder; each TEST() is a CTest test of its own. With -O1, which compiles sooner: what takes long to run
 # lies in the libraries.
 function(tessera_test name)
   cmake_parse_arguments(ARG "" "TIMEOUT" "LABELS;SOURCES;PRIVATE" ${ARGN})

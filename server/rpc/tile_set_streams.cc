@@ -234,7 +234,7 @@ absl::StatusOr<PlannedStream> TileSetStreams::Plan(const v1::TileSet& tile_set, 
   }
   DropUnused();
   const double reached = plan.parts(plan.parts_size() - 1).rmse();
-  if (needs.max_error.value_or(0.0) > 0.0 && reached > *needs.max_error && !needs.max_bytes.has_value()) {
+  if (needs.max_error.value_or(0.0) > 0.0 && reached > *needs.max_error) {
     return WithReason(
         absl::FailedPreconditionError(absl::StrCat("level ", needs.level, " reaches an error of ", reached,
                                                    ", max_error is ", *needs.max_error)),

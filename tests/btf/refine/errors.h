@@ -2,13 +2,17 @@
 #pragma once
 
 #include <cmath>
+#include <functional>
+#include <span>
 #include <string>
 #include <utility>
 
 #include <gtest/gtest.h>
 
+#include "btf/base/sha256.h"
 #include "btf/codec/decoder.h"
 #include "btf/wang/tile_set.h"
+#include "btf/wang/tile_set_parts.h"
 #include "tests/btf/codec/synthetic_btf.h"
 #include "tests/btf/render/hand_made.h"
 #include "tests/support/codecs.h"
@@ -49,6 +53,26 @@ inline double RmseBetween(const TileSet& a, const TileSet& b) {
     }
   }
   return std::sqrt(squares / static_cast<double>(count));
+}
+
+// The sets that the parts of a cut make, one after the other.
+inline void ForPrefixes(const TileSet& tile_set, const TileSetCut& cut,
+                        const std::function<void(size_t part, TileSetAssembler& assembler)>& body) {
+  const auto cutter = TileSetCutter::Create(tile_set, cut);
+  ASSERT_TRUE(cutter.ok()) << cutter.status();
+  const std::string first = cutter->Part(0, "").value();
+  auto assembler = TileSetAssembler::Begin(std::as_bytes(std::span(first)));
+  ASSERT_TRUE(assembler.ok()) << assembler.status();
+  for (size_t i = 0; i < cutter->num_parts(); ++i) {
+    if (i > 0) {
+      const std::string part = cutter->Part(i, Sha256Hex(std::as_bytes(std::span(first)))).value();
+      const absl::Status added = assembler->Add(std::as_bytes(std::span(part)));
+      ASSERT_TRUE(added.ok()) << added;
+    }
+    EXPECT_EQ(assembler->num_coefficients(), cutter->num_coefficients(i));
+    EXPECT_EQ(assembler->is_complete(), i + 1 == cutter->num_parts());
+    body(i, *assembler);
+  }
 }
 
 }  // namespace tessera

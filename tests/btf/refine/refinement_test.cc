@@ -10,7 +10,6 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "btf/base/sha256.h"
 #include "btf/codec/decoder.h"
 #include "btf/refine/set_layers.h"
 #include "btf/wang/tile_set_parts.h"
@@ -24,37 +23,17 @@ class CodecRefinementTest : public ::testing::TestWithParam<std::string> {};
 
 INSTANTIATE_TEST_SUITE_P(AllCodecs, CodecRefinementTest, ::testing::ValuesIn(AllCodecs()), CodecTestName);
 
-// The sets that the parts make, one after the other.
-void ForPrefixes(const TileSet& tile_set, const Refinement& refinement,
-                 const std::function<void(size_t part, TileSetAssembler& assembler)>& body) {
-  const auto cutter = TileSetCutter::Create(tile_set, refinement.cut);
-  ASSERT_TRUE(cutter.ok()) << cutter.status();
-  ASSERT_EQ(cutter->num_parts(), refinement.rmse.size());
-  const std::string first = cutter->Part(0, "").value();
-  auto assembler = TileSetAssembler::Begin(std::as_bytes(std::span(first)));
-  ASSERT_TRUE(assembler.ok()) << assembler.status();
-  for (size_t i = 0; i < cutter->num_parts(); ++i) {
-    if (i > 0) {
-      const std::string part = cutter->Part(i, Sha256Hex(std::as_bytes(std::span(first)))).value();
-      const absl::Status added = assembler->Add(std::as_bytes(std::span(part)));
-      ASSERT_TRUE(added.ok()) << added;
-    }
-    EXPECT_EQ(assembler->num_coefficients(), cutter->num_coefficients(i));
-    body(i, *assembler);
-  }
-  EXPECT_TRUE(assembler->is_complete());
-}
-
 TEST_P(CodecRefinementTest, EveryPrefixIsAValidSetAndErrorsFallToNothing) {
   const TileSet tile_set = TileSetOf(GetParam(), 4);
   const auto refinement = MakeRefinement(tile_set.btfels, {}, {});
   ASSERT_TRUE(refinement.ok()) << refinement.status();
   ASSERT_GE(refinement->rmse.size(), 3u);
+  EXPECT_EQ(TileSetCutter::Create(tile_set, refinement->cut)->num_parts(), refinement->rmse.size());
   EXPECT_EQ(refinement->cut.layers == nullptr, tile_set.btfels.num_coefficients <= kMostComponents);
   EXPECT_TRUE(std::ranges::is_sorted(refinement->rmse, std::greater()));
   EXPECT_EQ(refinement->rmse.back(), 0.0);
   double last = INFINITY;
-  ForPrefixes(tile_set, *refinement, [&](size_t i, TileSetAssembler& assembler) {
+  ForPrefixes(tile_set, refinement->cut, [&](size_t i, TileSetAssembler& assembler) {
     const auto bytes = SerializeTileSet(assembler.tile_set());
     ASSERT_TRUE(bytes.ok()) << bytes.status();
     const auto parsed = ParseTileSet(std::as_bytes(std::span(*bytes)));
@@ -77,7 +56,7 @@ TEST_P(CodecRefinementTest, AllPartsTogetherAreTheTileSet) {
   const TileSet tile_set = TileSetOf(GetParam(), 4);
   const auto refinement = MakeRefinement(tile_set.btfels, {}, {});
   ASSERT_TRUE(refinement.ok()) << refinement.status();
-  ForPrefixes(tile_set, *refinement, [&](size_t, TileSetAssembler& assembler) {
+  ForPrefixes(tile_set, refinement->cut, [&](size_t, TileSetAssembler& assembler) {
     if (assembler.is_complete()) {
       const TileSet& whole = assembler.tile_set();
       EXPECT_EQ(whole.btfels.codes, tile_set.btfels.codes);

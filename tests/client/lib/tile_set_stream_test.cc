@@ -195,8 +195,12 @@ TEST_F(TileSetStreamTest, NeedsThatCannotBeMetAreNamed) {
   const v1::TileSetPlan plan = Stream({}).progress.plan;
   const uint64_t two_parts = plan.parts(0).size_bytes() + plan.parts(1).size_bytes();
   refused({.max_error = 0.0, .max_bytes = two_parts}, "max_bytes", "reaches an error of");
-  EXPECT_EQ(refused({.level = 2, .max_error = 1e-7}, "max_error", "level 2 reaches an error of"),
-            "BOUND_NOT_REACHED");
+  for (const std::optional<uint64_t> max_bytes :
+       {std::optional<uint64_t>(), std::optional<uint64_t>(1 << 30)}) {
+    EXPECT_EQ(refused({.level = 2, .max_error = 1e-7, .max_bytes = max_bytes}, "max_error",
+                      "level 2 reaches an error of"),
+              "BOUND_NOT_REACHED");
+  }
   EXPECT_TRUE(absl::IsNotFound(client_->StreamTileSet("arrangements/surface-96/tileSets/none", {}).status()));
 }
 
