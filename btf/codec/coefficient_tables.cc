@@ -22,26 +22,27 @@ int64_t SizeOfShape(const std::vector<int64_t>& shape) {
 
 }  // namespace
 
-absl::StatusOr<CoefficientTables> CoefficientTables::Create(std::string_view codec_id, int num_coefficients,
-                                                            const Shapes& shapes) {
+absl::StatusOr<CoefficientTables> CoefficientTables::Of(const BtfelTable& table) {
+  const std::string& codec_id = table.codec_id;
+  const int num_coefficients = table.num_coefficients;
   CoefficientTables result;
   // The last index of the table runs over coefficients first .. first + count - 1.
   const auto add_columns = [&](const std::string& name, int64_t first, int64_t count) {
-    const auto found = shapes.find(name);
-    if (found == shapes.end()) {
+    const auto found = table.tables.find(name);
+    if (found == table.tables.end()) {
       return absl::OkStatus();
     }
-    if (found->second.empty() || found->second.back() != count || count < 1) {
-      return Misshapen(name, found->second, num_coefficients);
+    const std::vector<int64_t>& shape = found->second.shape;
+    if (shape.empty() || shape.back() != count || count < 1) {
+      return Misshapen(name, shape, num_coefficients);
     }
-    Rule rule{SizeOfShape(found->second), SizeOfShape(found->second), count,
-              std::vector<int64_t>(num_coefficients, -1)};
+    Rule rule{SizeOfShape(shape), SizeOfShape(shape), count, std::vector<int64_t>(num_coefficients, -1)};
     std::iota(rule.column_of.begin() + first, rule.column_of.begin() + first + count, int64_t{0});
     result.rules_[name] = std::move(rule);
     return absl::OkStatus();
   };
-  if (codec_id == "dfmf" && shapes.contains("luma")) {
-    const std::vector<int64_t>& luma = shapes.at("luma");
+  if (codec_id == "dfmf" && table.tables.contains("luma")) {
+    const std::vector<int64_t>& luma = table.tables.at("luma").shape;
     const int64_t rank = luma.empty() ? 0 : luma.back();
     if (rank < 1 || rank > num_coefficients) {
       return Misshapen("luma", luma, num_coefficients);
@@ -56,8 +57,8 @@ absl::StatusOr<CoefficientTables> CoefficientTables::Create(std::string_view cod
       }
     }
   }
-  if (codec_id == "view-pca" && shapes.contains("light_weights")) {
-    const std::vector<int64_t>& shape = shapes.at("light_weights");
+  if (codec_id == "view-pca" && table.tables.contains("light_weights")) {
+    const std::vector<int64_t>& shape = table.tables.at("light_weights").shape;
     const bool fits = shape.size() == 3 && shape[0] > 0 && num_coefficients == shape[0] * 3 * (shape[2] + 1);
     if (!fits) {
       return Misshapen("light_weights", shape, num_coefficients);
@@ -75,14 +76,6 @@ absl::StatusOr<CoefficientTables> CoefficientTables::Create(std::string_view cod
     }
   }
   return result;
-}
-
-absl::StatusOr<CoefficientTables> CoefficientTables::Of(const BtfelTable& table) {
-  Shapes shapes;
-  for (const auto& [name, codec_table] : table.tables) {
-    shapes[name] = codec_table.shape;
-  }
-  return Create(table.codec_id, table.num_coefficients, shapes);
 }
 
 bool CoefficientTables::NeedsEntries(uint32_t coefficient) const {

@@ -1,7 +1,7 @@
 // Which entries of a codec's tables belong to single coefficients: a reader that holds some coefficients
 // needs these entries of them only. FORMAT.md, "Parts of a tile set", lists them.
 //
-//   TESSERA_ASSIGN_OR_RETURN(auto split, CoefficientTables::Create(id, num_coefficients, shapes));
+//   TESSERA_ASSIGN_OR_RETURN(auto split, CoefficientTables::Of(table));
 //   for (int64_t entry : split.EntriesOf("luma", coefficients)) { ... }
 #pragma once
 
@@ -9,7 +9,6 @@
 #include <map>
 #include <span>
 #include <string>
-#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -22,15 +21,8 @@ namespace tessera {
 // Immutable.
 class CoefficientTables {
  public:
-  using Shapes = std::map<std::string, std::vector<int64_t>>;
-
-  // For the tables of these shapes; those that are not listed for the codec, and all of an unknown codec,
-  // belong to no coefficient. Errors: INVALID_ARGUMENT naming a table whose shape does not fit the number of
-  // coefficients.
-  [[nodiscard]] static absl::StatusOr<CoefficientTables> Create(std::string_view codec_id,
-                                                                int num_coefficients, const Shapes& shapes);
-
-  // For a table's own tables. Errors: likewise.
+  // Of the codec's tables; those that are not listed for the codec, and all of an unknown codec, belong to no
+  // coefficient. Errors: INVALID_ARGUMENT naming a table whose shape does not fit the number of coefficients.
   [[nodiscard]] static absl::StatusOr<CoefficientTables> Of(const BtfelTable& table);
 
   // Whether the table's entries belong to single coefficients.
