@@ -49,6 +49,21 @@ struct Layout {
   [[nodiscard]] int btfel_texels() const { return luma_groups + chroma_groups; }
 };
 
+// Factors under harmonics, `harmonics_words`: for each view node the groups of luminance, a texel for each
+// harmonic; then those of chrominance, for each of the first harmonics a texel for either, for each of the
+// others, which matter less, one of bytes for both. `harmonics_values`: what one step is worth, of each group
+// of luminance; of each of chrominance that of either in 16 bits, then in bytes.
+struct HarmonicsLayout {
+  int luma_groups = 0;
+  int chroma_groups = 0;
+  int n = 0;
+
+  [[nodiscard]] int num_low() const { return std::min(n, 9); }       // degrees 0 to 2
+  [[nodiscard]] int chroma_texels() const { return num_low() + n; }  // of a group
+  [[nodiscard]] int luma_texels() const { return luma_groups * n; }
+  [[nodiscard]] int texels() const { return luma_texels() + chroma_groups * chroma_texels(); }  // of a node
+};
+
 constexpr char kHead[] = R"(
 uniform usamplerBuffer btfel_words;
 uniform samplerBuffer codec_values;
@@ -74,7 +89,7 @@ void FindNodes(vec3 d, float by_covered, int side, out ivec3 nodes, out vec3 wei
 }
 
 // The signed 16-bit codes of four words, low + 2^16 high, 2^16 times too high, which saves moving them down. The higher
-// ones are off by what the lower ones are of 2^16: half a step at most.
+// ones have what the lower ones are of 2^16 as well: AddBits packs them so.
 vec4 Low(uvec4 u) { return vec4(ivec4(u << 16)); }
 vec4 High(uvec4 u) { return vec4(ivec4(u)); }
 )";
@@ -157,50 +172,87 @@ vec3 BlendUnturned(ivec4 btfels, vec4 weights, int count, Incidence light, vec3 
   return out;
 }
 
-// Adds to the colour `sum` what the blended codes of group `group` are under each of `n` harmonics.
-std::string AddUnderHarmonics(const std::string& group, const std::string& sum, int n) {
-  std::string out = absl::Substitute("    at = words + ($0) * $1;\n    of_group = vec3(0.0);\n", group, n);
-  for (int i = 0; i < n; ++i) {
-    absl::StrAppend(&out, absl::Substitute(R"(    u0 = texelFetch(harmonics_words, at.x + $0);
+// GLSL of what words u0, u1 and u2 of the three nodes make of the blended codes, read by `low` and `high`.
+std::string AtNodes(const std::string& low, const std::string& high) {
+  const auto at = [&](int node) {
+    return absl::Substitute("dot($0(u$2), even_codes) + dot($1(u$2), odd_codes)", low, high, node);
+  };
+  return absl::StrCat("vec3(", at(0), ", ", at(1), ", ", at(2), ")");
+}
+
+// Adds to the colour `sum` what words `texel` of the three nodes and the blended codes are under harmonic
+// `i`.
+std::string AddAtNodes(int texel, const std::string& sum, const std::string& low, const std::string& high,
+                       int i) {
+  return absl::Substitute(R"(    u0 = texelFetch(harmonics_words, at.x + $0);
     u1 = texelFetch(harmonics_words, at.y + $0);
     u2 = texelFetch(harmonics_words, at.z + $0);
-    at_nodes = vec3(dot(Low(u0), even_codes) + dot(High(u0), odd_codes),
-                    dot(Low(u1), even_codes) + dot(High(u1), odd_codes),
-                    dot(Low(u2), even_codes) + dot(High(u2), odd_codes));
-    of_group += dot(view_weights, at_nodes) * light[$0];
+    $1 += dot(view_weights, $2) * light[$3];
 )",
-                                           i));
+                          texel, sum, AtNodes(low, high), i);
+}
+
+// Adds to the colour `luma` what the blended codes of group g are under each of `n` harmonics.
+std::string AddLumaUnderHarmonics(int n) {
+  std::string out = absl::Substitute("    at = words + g * $0;\n    of_group = vec3(0.0);\n", n);
+  for (int i = 0; i < n; ++i) {
+    absl::StrAppend(&out, AddAtNodes(i, "of_group", "Low", "High", i));
   }
-  absl::StrAppend(&out,
-                  absl::Substitute("    $0 += texelFetch(harmonics_values, $1).x * of_group;\n", sum, group));
+  absl::StrAppend(&out, "    luma += texelFetch(harmonics_values, g).x * of_group;\n");
   return out;
 }
 
-std::string SourceOfHarmonics(const Layout& layout, int n) {
+// Likewise both chrominances, to `first_chroma` and `second_chroma`.
+std::string AddChromaUnderHarmonics(const HarmonicsLayout& harmonics) {
+  std::string out = absl::Substitute(
+      "    at = words + $0 + g * $1;\n    of_group = of_second = high_first = high_second = vec3(0.0);\n",
+      harmonics.luma_texels(), harmonics.chroma_texels());
+  for (int i = 0; i < harmonics.num_low(); ++i) {
+    absl::StrAppend(&out, AddAtNodes(2 * i, "of_group", "Low", "High", i),
+                    AddAtNodes(2 * i + 1, "of_second", "Low", "High", i));
+  }
+  for (int i = harmonics.num_low(); i < harmonics.n; ++i) {
+    absl::StrAppend(&out, AddAtNodes(harmonics.num_low() + i, "high_first", "Byte0", "Byte1", i),
+                    absl::Substitute("    high_second += dot(view_weights, $0) * light[$1];\n",
+                                     AtNodes("Byte2", "High"), i));
+  }
+  absl::StrAppend(&out, absl::Substitute(R"(    scales = texelFetch(harmonics_values, $0 + g);
+    first_chroma += scales.x * of_group + scales.z * high_first;
+    second_chroma += scales.y * of_second + scales.w * high_second;
+)",
+                                         harmonics.luma_groups));
+  return out;
+}
+
+std::string SourceOfHarmonics(const Layout& layout, const HarmonicsLayout& harmonics) {
   std::string out = absl::StrCat(
       kHead, "uniform samplerBuffer harmonics_values;\nuniform usamplerBuffer harmonics_words;\n",
-      kUnturnedDirectionGlsl, HarmonicsIncidenceGlsl(n),
+      kUnturnedDirectionGlsl, HarmonicsIncidenceGlsl(harmonics.n),
       absl::Substitute(R"(
+// Signed bytes of four words, 2^24 times too high; the highest is High's.
+vec4 Byte0(uvec4 u) { return vec4(ivec4(u << 24)); }
+vec4 Byte1(uvec4 u) { return vec4(ivec4(u << 16)); }
+vec4 Byte2(uvec4 u) { return vec4(ivec4(u << 8)); }
+
 vec3 BlendUnturned(ivec4 btfels, vec4 weights, int count, Incidence light, vec3 view) {
   bool is_lit = view.z > 0.0 && count > 0;
   ivec3 view_nodes, at;
-  vec3 view_weights, at_nodes, of_group, luma = vec3(0.0), first_chroma = vec3(0.0), second_chroma = vec3(0.0);
+  vec3 view_weights, of_group, of_second, high_first, high_second;
+  vec3 luma = vec3(0.0), first_chroma = vec3(0.0), second_chroma = vec3(0.0);
+  vec4 scales;
   FindNodes(view, texelFetch(codec_values, 0).z, $0, view_nodes, view_weights);
   ivec3 words = view_nodes * $1;
   uvec4 u, u0, u1, u2;
   int n, g = 0;
   do {
 )",
-                       layout.view_nodes, layout.num_groups() * n),
-      BlendCodes("g", layout.btfel_texels()), AddUnderHarmonics("g", "luma", n), "  } while (++g < ",
+                       layout.view_nodes, harmonics.texels()),
+      BlendCodes("g", layout.btfel_texels()), AddLumaUnderHarmonics(harmonics.n), "  } while (++g < ",
       layout.luma_groups, ");\n");
   if (layout.chroma_groups > 0) {
     const std::string first = absl::StrCat("g + ", layout.luma_groups);
     absl::StrAppend(&out, "  g = 0;\n  do {\n", BlendCodes(first, layout.btfel_texels()),
-                    AddUnderHarmonics(first, "first_chroma", n),
-                    AddUnderHarmonics(absl::StrCat("g + ", layout.luma_groups + layout.chroma_groups),
-                                      "second_chroma", n),
-                    "  } while (++g < ", layout.chroma_groups, ");\n");
+                    AddChromaUnderHarmonics(harmonics), "  } while (++g < ", layout.chroma_groups, ");\n");
   }
   absl::StrAppend(&out, R"(
   vec3 value = luma * texelFetch(codec_values, 1).xyz + first_chroma * texelFetch(codec_values, 2).xyz +
@@ -212,10 +264,19 @@ vec3 BlendUnturned(ivec4 btfels, vec4 weights, int count, Incidence light, vec3 
   return out;
 }
 
-// Adds the nearest signed code to a word, as its lower half where `place` is even, else times 2^16.
+// Adds a signed code to a word, times 2^shift, nearest to the value with what is below it there, which
+// shaders read along. Lower codes come first.
+void AddBits(float value, int shift, float most, uint32_t& word) {
+  const auto below = static_cast<int32_t>(shift == 0 ? 0U : word << (32 - shift));
+  const double fraction = std::ldexp(static_cast<double>(below), -32);
+  const auto code = static_cast<int>(
+      std::clamp(std::round(value - fraction), -static_cast<double>(most), static_cast<double>(most)));
+  word += static_cast<uint32_t>(code) << shift;
+}
+
+// Likewise a code of 16 bits: the lower half where `place` is even, else the higher.
 void AddCode(float value, size_t place, uint32_t& word) {
-  const auto code = static_cast<int>(std::clamp(std::round(value), -kMostCode, kMostCode));
-  word += static_cast<uint32_t>(code) << (16 * (place % 2));
+  AddBits(value, 16 * static_cast<int>(place % 2), kMostCode, word);
 }
 
 // Factors of one group in the order of the table: the first, their number, the first coefficient they
@@ -276,41 +337,62 @@ void PackFactors(const DfmfDecoder& decoder, std::span<const float> scales, cons
   }
 }
 
-// Of each view node, group and harmonic the factors, and what one step of a group's codes is worth.
-void PackFactorsUnderHarmonics(const DfmfDecoder& decoder, std::span<const float> scales, int n,
-                               HarmonicsGlsl& glsl) {
+// Adds codes of some of the harmonics, and sets what one step of them is worth.
+void PackFactorsUnderHarmonics(const DfmfDecoder& decoder, std::span<const float> scales,
+                               const HarmonicsLayout& harmonics, HarmonicsGlsl& glsl) {
   const std::vector<Group> groups = GroupsOf(decoder);
   const int num_views = decoder.view_grid().num_nodes();
   std::vector<Eigen::MatrixXd> factors(num_views);
   for (int view = 0; view < num_views; ++view) {
-    factors[view] = decoder.FactorsUnderHarmonics({{view, view, view}, {1.0, 0.0, 0.0}}, n);
+    factors[view] = decoder.FactorsUnderHarmonics({{view, view, view}, {1.0, 0.0, 0.0}}, harmonics.n);
   }
-  glsl.values.assign(4 * groups.size(), 0.0F);
-  glsl.words.assign(num_views * groups.size() * n * 4, 0);
-  for (size_t g = 0; g < groups.size(); ++g) {
-    const Group& group = groups[g];
+  glsl.values.assign(4 * static_cast<size_t>(harmonics.luma_groups + harmonics.chroma_groups), 0.0F);
+  glsl.words.assign(static_cast<size_t>(num_views) * harmonics.texels() * 4, 0);
+  // Of harmonics first .. last - 1 of a group, the texel of each at a view node, at `step` from one to the
+  // next; bits 8 are bytes `first_byte` and the next of each word.
+  const auto pack = [&](const Group& group, int first, int last, int texel, int step, int bits,
+                        int first_byte) {
     const auto factor = [&](int view, int i, int f) {
       return static_cast<float>(factors[view](group.factor + f, i)) * scales[group.coefficient + f];
     };
     float most = 0.0F;
     for (int view = 0; view < num_views; ++view) {
-      for (int i = 0; i < n; ++i) {
+      for (int i = first; i < last; ++i) {
         for (int f = 0; f < group.count; ++f) {
           most = std::max(most, std::abs(factor(view, i, f)));
         }
       }
     }
-    // Codes, of factors and of BTFels, stand 2^16 times too high.
-    glsl.values[4 * g] = most / kMostCode / 65536.0F / 65536.0F;
-    const float inverse = most > 0.0F ? kMostCode / most : 0.0F;
+    const float most_code = std::ldexp(1.0F, bits - 1) - 1.0F;
+    const float inverse = most > 0.0F ? most_code / most : 0.0F;
     for (int view = 0; view < num_views; ++view) {
-      for (int i = 0; i < n; ++i) {
-        uint32_t* const words = glsl.words.data() + ((view * groups.size() + g) * n + i) * 4;
+      for (int i = first; i < last; ++i) {
+        uint32_t* const words =
+            glsl.words.data() +
+            (static_cast<size_t>(view) * harmonics.texels() + texel + step * (i - first)) * 4;
         for (int f = 0; f < group.count; ++f) {
-          AddCode(factor(view, i, f) * inverse, static_cast<size_t>(f), words[f / 2]);
+          const int shift = bits * (f % 2) + 8 * first_byte;
+          AddBits(factor(view, i, f) * inverse, shift, most_code, words[f / 2]);
         }
       }
     }
+    // Codes stand 2^(32 - bits) times too high, those of BTFels 2^16 times.
+    return std::ldexp(most / most_code, bits - 32 - 16);
+  };
+  const int n = harmonics.n;
+  for (int g = 0; g < harmonics.luma_groups; ++g) {
+    glsl.values[4 * static_cast<size_t>(g)] = pack(groups[static_cast<size_t>(g)], 0, n, g * n, 1, 16, 0);
+  }
+  for (int g = 0; g < harmonics.chroma_groups; ++g) {
+    const int texel = harmonics.luma_texels() + g * harmonics.chroma_texels();
+    float* const values = &glsl.values[4 * static_cast<size_t>(harmonics.luma_groups + g)];
+    const Group& first = groups[static_cast<size_t>(harmonics.luma_groups + g)];
+    const Group& second = groups[static_cast<size_t>(harmonics.luma_groups + harmonics.chroma_groups + g)];
+    const int low = harmonics.num_low();
+    values[0] = pack(first, 0, low, texel, 2, 16, 0);
+    values[1] = pack(second, 0, low, texel + 1, 2, 16, 0);
+    values[2] = pack(first, low, n, texel + 2 * low, 1, 8, 0);
+    values[3] = pack(second, low, n, texel + 2 * low, 1, 8, 2);
   }
 }
 
@@ -378,8 +460,10 @@ absl::StatusOr<HarmonicsGlsl> DfmfHarmonicsGlsl(const BtfelTable& table,
                                                 std::span<const BtfelTable* const> more, int n) {
   TESSERA_ASSIGN_OR_RETURN(const std::unique_ptr<DfmfDecoder> decoder, DfmfDecoder::Create(table));
   TESSERA_RETURN_IF_ERROR(CheckSameCoefficients(table, more));
-  HarmonicsGlsl glsl{.source = SourceOfHarmonics(Layout(*decoder), n)};
-  PackFactorsUnderHarmonics(*decoder, CodeScales(table, more), n, glsl);
+  const Layout layout(*decoder);
+  const HarmonicsLayout harmonics{layout.luma_groups, layout.chroma_groups, n};
+  HarmonicsGlsl glsl{.source = SourceOfHarmonics(layout, harmonics)};
+  PackFactorsUnderHarmonics(*decoder, CodeScales(table, more), harmonics, glsl);
   return glsl;
 }
 
