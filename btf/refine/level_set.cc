@@ -3,177 +3,248 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <iterator>
 #include <memory>
+#include <optional>
+#include <span>
 #include <utility>
+#include <vector>
 
 #include <absl/strings/str_cat.h>
-#include <Eigen/Cholesky>
 #include <Eigen/Core>
 
 #include "btf/base/status_macros.h"
 #include "btf/codec/decoder.h"
 #include "btf/codec/quantize.h"
 #include "btf/math/conventions.h"
-#include "btf/mips/tile_mips.h"
+#include "btf/refine/scene_cases.h"
 #include "btf/wang/scene_needs.h"
 
 namespace tessera {
 namespace {
 
-constexpr uint64_t kMostMipBytes = uint64_t{1} << 30;
-// Relative to the mean eigenvalue: what directions do not determine stays small.
-constexpr double kTurnRidge = 1e-6;
-constexpr size_t kErrorTexels = 1024;
+// Patches are about as wide as half a strip, and cells much smaller.
+constexpr int kCellsPerStrip = 4;
+constexpr size_t kErrorTexels = 256;
 constexpr size_t kErrorPairs = 8;
+constexpr size_t kBtfelsPerStop = 256;
 
-using Pair = std::pair<Eigen::Vector3d, Eigen::Vector3d>;  // light, view
+// By how much the pixel moves where the texel moves by one across, or down, of the tile.
+struct Way {
+  int x = 0;
+  int y = 0;
+};
+constexpr std::array<Way, 4> kAcross = {{{1, 0}, {0, 1}, {-1, 0}, {0, -1}}};  // by turns
+constexpr std::array<Way, 4> kDown = {{{0, 1}, {-1, 0}, {0, -1}, {1, 0}}};
 
-// Each measured view with kTurnLights lights, another first one for each.
-std::vector<Pair> TurnPairs(const BtfelTable& table) {
-  std::vector<Pair> pairs;
-  const size_t lights = std::min(table.lights.size(), static_cast<size_t>(kTurnLights));
-  for (size_t view = 0; view < table.views.size(); ++view) {
-    for (size_t i = 0; i < lights; ++i) {
-      const size_t light = (i * table.lights.size() / lights + view) % table.lights.size();
-      pairs.emplace_back(VectorFromDirection(table.lights[light]), VectorFromDirection(table.views[view]));
+// A tile set seen in cells of side x side texels.
+class Cells {
+ public:
+  Cells(const TileSet& tile_set, int width, int side)
+      : tile_set_(tile_set),
+        width_(width),
+        height_(static_cast<int>(tile_set.source_pixels.back()) / width + 1),
+        side_(side) {}
+
+  // The first of the pixels that the cell covers in the patch that most of its texels show, and its turn.
+  [[nodiscard]] uint32_t TexelOf(int tile, int cell_x, int cell_y) {
+    patches_.clear();
+    for (int y = 0; y < side_; ++y) {
+      for (int x = 0; x < side_; ++x) {
+        Count(PatchAt(tile, cell_x * side_ + x, cell_y * side_ + y));
+      }
+    }
+    // The first of those that most show.
+    const Patch& patch = std::ranges::max_element(patches_, {}, &std::pair<Patch, int>::second)->first;
+    const Way across = kAcross[patch.turns];
+    const Way down = kDown[patch.turns];
+    const auto first = [&](int origin, int step_x, int step_y) {
+      const int at = origin + side_ * (cell_x * step_x + cell_y * step_y);
+      return at + (side_ - 1) * (std::min(step_x, 0) + std::min(step_y, 0));
+    };
+    // A patch may end at the exemplar's side within the cell.
+    const int x = std::clamp(first(patch.x, across.x, down.x), 0, std::max(width_ - side_, 0));
+    const int y = std::clamp(first(patch.y, across.y, down.y), 0, std::max(height_ - side_, 0));
+    return PackTexel(static_cast<uint32_t>(y * width_ + x), patch.turns);
+  }
+
+  // The mean over the pixels from `first` on that the tile set has.
+  void MeanOf(uint32_t first, std::span<float> mean) const {
+    std::ranges::fill(mean, 0.0F);
+    const BtfelTable& table = tile_set_.btfels;
+    float count = 0.0F;
+    const int left = static_cast<int>(first) % width_;
+    const int top = static_cast<int>(first) / width_;
+    for (int y = top; y < std::min(top + side_, height_); ++y) {
+      const std::vector<uint32_t>& pixels = tile_set_.source_pixels;
+      const auto end = static_cast<uint32_t>(y * width_ + std::min(left + side_, width_));
+      for (auto pixel = std::ranges::lower_bound(pixels, static_cast<uint32_t>(y * width_ + left));
+           pixel != pixels.end() && *pixel < end; ++pixel) {
+        std::ranges::transform(table.btfel(static_cast<size_t>(pixel - pixels.begin())), mean, mean.begin(),
+                               [](uint8_t code, float sum) { return sum + static_cast<float>(code); });
+        count += 1.0F;
+      }
+    }
+    for (size_t i = 0; i < mean.size(); ++i) {
+      mean[i] = table.offset[i] + table.step[i] * (mean[i] / std::max(count, 1.0F));
     }
   }
-  return pairs;
-}
 
-// [3][k], of a BTFel that is turned by `turns`, in the frame of the pair.
-Eigen::MatrixXd RowsOf(const Decoder& decoder, const Pair& pair, int turns) {
-  Eigen::MatrixXd rows = Eigen::MatrixXd::Zero(3, decoder.num_coefficients());
-  const LinearForm form =
-      decoder.Form(UnturnedFromTurned(pair.first, turns), UnturnedFromTurned(pair.second, turns));
-  const double* weight = form.weights.data();
-  for (const LinearForm::Run& run : form.runs) {
-    for (int i = run.first; i < run.first + run.count; ++i) {
-      rows(run.channel, i) += *weight++;
+ private:
+  // Named by the pixel that it would show at texel (0, 0).
+  struct Patch {
+    int x = 0;
+    int y = 0;
+    int turns = 0;
+    bool operator==(const Patch&) const = default;
+  };
+
+  [[nodiscard]] Patch PatchAt(int tile, int x, int y) const {
+    const uint32_t texel = tile_set_.texel(tile, x, y);
+    const auto pixel = static_cast<int>(tile_set_.source_pixels[BtfelOfTexel(texel)]);
+    const int turns = TurnsOfTexel(texel);
+    return {.x = pixel % width_ - x * kAcross[turns].x - y * kDown[turns].x,
+            .y = pixel / width_ - x * kAcross[turns].y - y * kDown[turns].y,
+            .turns = turns};
+  }
+
+  void Count(const Patch& patch) {
+    const auto found = std::ranges::find(patches_, patch, &std::pair<Patch, int>::first);
+    if (found == patches_.end()) {
+      patches_.emplace_back(patch, 1);
+    } else {
+      ++found->second;
     }
   }
-  return rows;
-}
 
-// [turns 1..3]: what turns coefficients by so many quarter turns, as nearly as the codec can.
-absl::StatusOr<std::array<Eigen::MatrixXd, 4>> TurnMatrices(const Decoder& decoder, const BtfelTable& table,
-                                                            const RunContext& context) {
-  const int k = table.num_coefficients;
-  if (k > kMostTurnedCoefficients) {
-    return absl::ResourceExhaustedError(absl::StrCat("a level of ", k, " coefficients of codec ",
-                                                     table.codec_id, ", which cannot turn them: at most ",
-                                                     kMostTurnedCoefficients));
-  }
-  const std::vector<Pair> pairs = TurnPairs(table);
-  std::array<Eigen::MatrixXd, 4> rows;
-  for (int turns = 0; turns < 4; ++turns) {
-    rows[turns].resize(3 * static_cast<Eigen::Index>(pairs.size()), k);
-    for (size_t i = 0; i < pairs.size(); ++i) {
-      rows[turns].middleRows<3>(3 * static_cast<Eigen::Index>(i)) = RowsOf(decoder, pairs[i], turns);
-    }
-    TESSERA_RETURN_IF_ERROR(context.CheckStop());
-  }
-  Eigen::MatrixXd normal = Eigen::MatrixXd::Zero(k, k);
-  normal.selfadjointView<Eigen::Lower>().rankUpdate(rows[0].transpose());
-  normal.diagonal().array() += std::max(kTurnRidge * normal.trace() / k, 1e-30);
-  const Eigen::LDLT<Eigen::MatrixXd> solver(normal.selfadjointView<Eigen::Lower>());
-  std::array<Eigen::MatrixXd, 4> matrices;
-  for (int turns = 1; turns < 4; ++turns) {
-    TESSERA_RETURN_IF_ERROR(context.CheckStop());
-    matrices[turns] = solver.solve(rows[0].transpose() * rows[turns]);
-  }
-  return matrices;
-}
+  const TileSet& tile_set_;
+  int width_;
+  int height_;  // of what the tile set shows
+  int side_;
+  std::vector<std::pair<Patch, int>> patches_;  // of a cell, with how many texels show them
+};
 
-Eigen::VectorXd ValuesOf(const BtfelTable& table, uint32_t btfel) {
-  Eigen::VectorXd values(table.num_coefficients);
-  const auto codes = table.btfel(btfel);
-  for (Eigen::Index i = 0; i < values.size(); ++i) {
-    values[i] = table.offset[i] + static_cast<double>(table.step[i]) * codes[static_cast<size_t>(i)];
+// S of level_set.h, texels.
+int CellSide(const TileSet& tile_set, int level) {
+  int side = 1;
+  while (side < (1 << (level - 1)) && side * 2 * kCellsPerStrip <= tile_set.strip_height) {
+    side *= 2;
   }
-  return values;
-}
-
-// One texel of the level from its parts: coefficients, and the turn that they have.
-std::pair<Eigen::VectorXd, int> Joined(const BtfelTable& table, std::span<const MipPart> parts,
-                                       const std::array<Eigen::MatrixXd, 4>& turns) {
-  const MipPart& largest = *std::ranges::max_element(
-      parts, [](const MipPart& a, const MipPart& b) { return a.weight < b.weight; });
-  const int turn = TurnsOfTexel(largest.texel);
-  Eigen::VectorXd sum = Eigen::VectorXd::Zero(table.num_coefficients);
-  for (const MipPart& part : parts) {
-    if (part.weight > 0.0F) {
-      const int further = (TurnsOfTexel(part.texel) - turn) & 3;
-      const Eigen::VectorXd values = ValuesOf(table, BtfelOfTexel(part.texel));
-      sum += part.weight * (further == 0 ? values : turns[further] * values);
-    }
-  }
-  return {std::move(sum), turn};
+  return side;
 }
 
 // Quantised, with a range of its own.
-absl::Status JoinParts(const MipLevel& level, int parts_per_texel,
-                       const std::array<Eigen::MatrixXd, 4>& turns, const RunContext& context,
-                       TileSet& joined) {
-  const auto k = static_cast<size_t>(level.btfels.num_coefficients);
-  const size_t num_texels = level.parts.size() / parts_per_texel;
-  std::vector<float> values(num_texels * k);
+absl::Status QuantizeMeans(const Cells& cells, const RunContext& context, TileSet& far) {
+  const auto k = static_cast<size_t>(far.btfels.num_coefficients);
   std::vector<float> low(k, INFINITY);
   std::vector<float> high(k, -INFINITY);
-  joined.tile_index.resize(num_texels);
-  for (size_t texel = 0; texel < num_texels; ++texel) {
-    if (texel % 256 == 0) {
-      TESSERA_RETURN_IF_ERROR(context.CheckStop());
+  std::vector<float> mean(k);
+  const auto for_means = [&](const auto& body) {
+    for (size_t i = 0; i < far.source_pixels.size(); ++i) {
+      if (i % kBtfelsPerStop == 0) {
+        TESSERA_RETURN_IF_ERROR(context.CheckStop());
+      }
+      cells.MeanOf(far.source_pixels[i], mean);
+      body(i);
     }
-    const auto parts = std::span(level.parts).subspan(texel * parts_per_texel, parts_per_texel);
-    const auto [sum, turn] = Joined(level.btfels, parts, turns);
-    for (size_t i = 0; i < k; ++i) {
-      const auto value = static_cast<float>(sum[static_cast<Eigen::Index>(i)]);
-      values[texel * k + i] = value;
-      low[i] = std::min(low[i], value);
-      high[i] = std::max(high[i], value);
+    return absl::OkStatus();
+  };
+  TESSERA_RETURN_IF_ERROR(for_means([&](size_t) {
+    for (size_t c = 0; c < k; ++c) {
+      low[c] = std::min(low[c], mean[c]);
+      high[c] = std::max(high[c], mean[c]);
     }
-    joined.tile_index[texel] = PackTexel(static_cast<uint32_t>(texel), turn);
-  }
+  }));
   Quantisation quantisation = UniformQuantisation(low, high);
-  joined.btfels.codes.assign(values.size(), 0);
-  Quantize(quantisation, values, joined.btfels.codes);
-  joined.btfels.offset = std::move(quantisation.offset);
-  joined.btfels.step = std::move(quantisation.step);
+  std::vector<uint8_t> codes(far.source_pixels.size() * k);
+  TESSERA_RETURN_IF_ERROR(
+      for_means([&](size_t i) { Quantize(quantisation, mean, std::span(codes).subspan(i * k, k)); }));
+  far.btfels.codes = CodeBuffer(std::move(codes));
+  far.btfels.offset = std::move(quantisation.offset);
+  far.btfels.step = std::move(quantisation.step);
   return absl::OkStatus();
 }
 
-double RmseAgainst(const MipLevel& level, int parts_per_texel, const Decoder& parts_decoder,
-                   const TileSet& joined, const Decoder& decoder) {
-  const BtfelTable& table = level.btfels;
+// Squares of texels of side x side texels of a tile set, under one pair of light and view.
+class Squares {
+ public:
+  explicit Squares(const TileSet& tile_set, const Decoder& decoder, int side)
+      : tile_set_(tile_set), decoder_(decoder), side_(side) {}
+
+  // The mean over the square's texels, by turns: coefficients times the share of the texels.
+  void Add(int tile, int square_x, int square_y) {
+    const BtfelTable& table = tile_set_.btfels;
+    const auto k = static_cast<size_t>(table.num_coefficients);
+    sums_.emplace_back();
+    std::array<std::vector<double>, 4>& sums = sums_.back();
+    const double share = 1.0 / (static_cast<double>(side_) * side_);
+    for (int y = 0; y < side_; ++y) {
+      for (int x = 0; x < side_; ++x) {
+        const uint32_t texel = tile_set_.texel(tile, square_x * side_ + x, square_y * side_ + y);
+        std::vector<double>& sum = sums[TurnsOfTexel(texel)];
+        sum.resize(k, 0.0);
+        const auto codes = table.btfel(BtfelOfTexel(texel));
+        for (size_t c = 0; c < k; ++c) {
+          sum[c] += share * (table.offset[c] + static_cast<double>(table.step[c]) * codes[c]);
+        }
+      }
+    }
+  }
+
+  // [squares]
+  [[nodiscard]] std::vector<Eigen::Array3d> Reflected(const Eigen::Vector3d& light,
+                                                      const Eigen::Vector3d& view) const {
+    std::array<LinearForm, 4> forms;
+    for (int t = 0; t < 4; ++t) {
+      forms[t] = decoder_.Form(UnturnedFromTurned(light, t), UnturnedFromTurned(view, t));
+    }
+    std::vector<Eigen::Array3d> reflected;
+    for (const std::array<std::vector<double>, 4>& sums : sums_) {
+      Eigen::Array3d value = Eigen::Array3d::Zero();
+      for (int t = 0; t < 4; ++t) {
+        if (!sums[t].empty()) {
+          value += forms[t].ValueOf(sums[t]);
+        }
+      }
+      reflected.push_back(value.max(0.0));
+    }
+    return reflected;
+  }
+
+ private:
+  const TileSet& tile_set_;
+  const Decoder& decoder_;
+  int side_;
+  std::vector<std::array<std::vector<double>, 4>> sums_;
+};
+
+absl::StatusOr<double> RmseAgainst(const TileSet& tile_set, const TileSet& far, int level,
+                                   const RunContext& context) {
+  TESSERA_ASSIGN_OR_RETURN(const std::unique_ptr<Decoder> decoder, MakeDecoder(tile_set.btfels));
+  TESSERA_ASSIGN_OR_RETURN(const std::unique_ptr<Decoder> far_decoder, MakeDecoder(far.btfels));
+  const int squares_across = tile_set.tile_size >> level;
+  Squares whole(tile_set, *decoder, 1 << level);
+  Squares coarse(far, *far_decoder, (1 << level) / CellSide(tile_set, level));
+  const size_t per_tile = static_cast<size_t>(squares_across) * static_cast<size_t>(squares_across);
+  for (const size_t at : Scatter(tile_set.tile_codes.size() * per_tile, kErrorTexels)) {
+    TESSERA_RETURN_IF_ERROR(context.CheckStop());
+    const auto tile = static_cast<int>(at / per_tile);
+    const int x = static_cast<int>(at % per_tile) % squares_across;
+    const int y = static_cast<int>(at % per_tile) / squares_across;
+    whole.Add(tile, x, y);
+    coarse.Add(tile, x, y);
+  }
+  const BtfelTable& table = tile_set.btfels;
   double squares = 0.0;
   size_t samples = 0;
-  const size_t stride = (joined.tile_index.size() + kErrorTexels - 1) / kErrorTexels;
   for (size_t pair = 0; pair < kErrorPairs; ++pair) {
     const size_t at = 2 * pair + 1;
     const Eigen::Vector3d view = VectorFromDirection(table.views[at * table.views.size() / 16]);
     const Eigen::Vector3d light = VectorFromDirection(table.lights[at * 5 % 16 * table.lights.size() / 16]);
-    std::array<LinearForm, 4> of_parts;
-    std::array<LinearForm, 4> of_joined;
-    for (int t = 0; t < 4; ++t) {
-      of_parts[t] = parts_decoder.Form(UnturnedFromTurned(light, t), UnturnedFromTurned(view, t));
-      of_joined[t] = decoder.Form(UnturnedFromTurned(light, t), UnturnedFromTurned(view, t));
-    }
-    const auto value_of = [](const LinearForm& form, const Eigen::VectorXd& values) {
-      return form.ValueOf(std::span(values.data(), static_cast<size_t>(values.size())));
-    };
-    for (size_t texel = 0; texel < joined.tile_index.size(); texel += stride) {
-      Eigen::Array3d exact = Eigen::Array3d::Zero();
-      for (const MipPart& part : std::span(level.parts).subspan(texel * parts_per_texel, parts_per_texel)) {
-        if (part.weight > 0.0F) {
-          exact += part.weight *
-                   value_of(of_parts[TurnsOfTexel(part.texel)], ValuesOf(table, BtfelOfTexel(part.texel)));
-        }
-      }
-      const uint32_t packed = joined.tile_index[texel];
-      const Eigen::Array3d got =
-          value_of(of_joined[TurnsOfTexel(packed)], ValuesOf(joined.btfels, BtfelOfTexel(packed)));
-      squares += (exact.max(0.0) - got.max(0.0)).square().sum();
+    const std::vector<Eigen::Array3d> exact = whole.Reflected(light, view);
+    const std::vector<Eigen::Array3d> got = coarse.Reflected(light, view);
+    for (size_t i = 0; i < exact.size(); ++i) {
+      squares += (exact[i] - got[i]).square().sum();
       samples += 3;
     }
   }
@@ -187,42 +258,48 @@ absl::StatusOr<LevelSet> MakeLevelSet(const TileSet& tile_set, int level, const 
     return absl::InvalidArgumentError(absl::StrCat("level ", level, ": tiles of ", tile_set.tile_size, "x",
                                                    tile_set.tile_size, " texels have levels 1 to ", last));
   }
-  TESSERA_ASSIGN_OR_RETURN(TileMips mips, MakeTileMips(tile_set, {.max_bytes = kMostMipBytes}, context));
-  MipLevel& from = mips.levels[static_cast<size_t>(level) - 1];
+  const std::optional<SourceGrid> grid = SourceGridOf(tile_set);
+  if (!grid.has_value() || grid->footprint != 1 || tile_set.source_pixels.back() > kLargestPackedBtfel) {
+    return absl::FailedPreconditionError(
+        "the tile set does not record where its BTFels lie in the exemplar: synthesise it again");
+  }
+  const int side = CellSide(tile_set, level);
   LevelSet result;
   TileSet& far = result.tile_set;
   far.arrangement_id = tile_set.arrangement_id;
   far.arrangement_sha256 = tile_set.arrangement_sha256;
-  far.tile_size = from.tile_size;
-  far.strip_height = std::max(tile_set.strip_height >> level, 1);
+  far.tile_size = tile_set.tile_size / side;
+  far.strip_height = std::max(tile_set.strip_height / side, 1);
   far.tile_codes = tile_set.tile_codes;
   far.provenance = tile_set.provenance;
   far.radiometry = tile_set.radiometry;
-  if (mips.parts_per_texel == 1) {
-    far.btfels = from.btfels.WithoutCodes();
-    if (from.parts.size() > kMostMipBytes / from.btfels.num_coefficients) {
-      return absl::ResourceExhaustedError(absl::StrCat("a level of ", from.parts.size(), " texels of ",
-                                                       from.btfels.num_coefficients,
-                                                       " coefficients: at most ", kMostMipBytes, " bytes"));
-    }
-    std::vector<uint8_t> codes;
-    codes.reserve(from.parts.size() * from.btfels.num_coefficients);
-    for (const MipPart& part : from.parts) {
-      const auto btfel = from.btfels.btfel(BtfelOfTexel(part.texel));
-      far.tile_index.push_back(
-          PackTexel(static_cast<uint32_t>(far.tile_index.size()), TurnsOfTexel(part.texel)));
-      codes.insert(codes.end(), btfel.begin(), btfel.end());
-    }
-    far.btfels.codes = CodeBuffer(std::move(codes));
-    result.rmse = from.quantisation_rmse;
+  far.metadata["exemplar"] = {{"width", grid->width}, {"footprint", side}};
+  far.btfels = tile_set.btfels.WithoutCodes();
+  if (level == 1) {
+    far.tile_index = tile_set.tile_index;
+    far.source_pixels = tile_set.source_pixels;
+    far.btfels.codes = tile_set.btfels.codes;
     return result;
   }
-  TESSERA_ASSIGN_OR_RETURN(const std::unique_ptr<Decoder> parts_decoder, MakeDecoder(from.btfels));
-  TESSERA_ASSIGN_OR_RETURN(const auto turns, TurnMatrices(*parts_decoder, from.btfels, context));
-  far.btfels = from.btfels.WithoutCodes();
-  TESSERA_RETURN_IF_ERROR(JoinParts(from, mips.parts_per_texel, turns, context, far));
-  TESSERA_ASSIGN_OR_RETURN(const std::unique_ptr<Decoder> decoder, MakeDecoder(far.btfels));
-  result.rmse = RmseAgainst(from, mips.parts_per_texel, *parts_decoder, far, *decoder);
+  Cells cells(tile_set, grid->width, side);
+  for (size_t tile = 0; tile < tile_set.tile_codes.size(); ++tile) {
+    TESSERA_RETURN_IF_ERROR(context.CheckStop());
+    for (int y = 0; y < far.tile_size; ++y) {
+      for (int x = 0; x < far.tile_size; ++x) {
+        far.tile_index.push_back(cells.TexelOf(static_cast<int>(tile), x, y));
+      }
+    }
+  }
+  // Pixels become BTFels, numbered by their rank.
+  std::ranges::transform(far.tile_index, std::back_inserter(far.source_pixels), &BtfelOfTexel);
+  std::ranges::sort(far.source_pixels);
+  far.source_pixels.erase(std::ranges::unique(far.source_pixels).begin(), far.source_pixels.end());
+  for (uint32_t& texel : far.tile_index) {
+    const auto rank = std::ranges::lower_bound(far.source_pixels, BtfelOfTexel(texel));
+    texel = PackTexel(static_cast<uint32_t>(rank - far.source_pixels.begin()), TurnsOfTexel(texel));
+  }
+  TESSERA_RETURN_IF_ERROR(QuantizeMeans(cells, context, far));
+  TESSERA_ASSIGN_OR_RETURN(result.rmse, RmseAgainst(tile_set, far, level, context));
   return result;
 }
 

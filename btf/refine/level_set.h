@@ -1,9 +1,11 @@
-// A mip level of a tile set as a tile set of its own: for scenes that are far away, and need nothing finer.
+// What scenes need of a tile set whose finest mip level they show is level l, as a tile set of its own: tiles
+// of w / S texels. S is 2^(l - 1), so that each texel of the level is the mean of 2 x 2 of them, but at most
+// a quarter of the strip height: patches would be lost.
 //
-// Where codecs turn coefficients (Codec::Turns) its texels are those of the level (mips/tile_mips.h). Of the
-// others a level's texel may have parts of several turns, and a texel of a tile set has one: the part of the
-// largest share gives the turn, and the coefficients of the others are turned to it by the k x k matrix that
-// errs least, in the least-squares sense, over the measured views with kTurnLights lights each.
+// A texel stands for a cell of S x S texels. It shows the patch that most of the cell shows, as the mean over
+// the S x S pixels that the cell covers in the exemplar: seams move by less than half a cell. So its BTFels
+// lie in the exemplar as those of the tile set do (SourceGrid), no patch's turn mixes with another's, and
+// what is there is as smooth as the material.
 //
 //   TESSERA_ASSIGN_OR_RETURN(LevelSet far, MakeLevelSet(tile_set, /*level=*/3, context));
 #pragma once
@@ -17,21 +19,17 @@
 
 namespace tessera {
 
-inline constexpr int kTurnLights = 12;
-// Turning by least squares solves for this many unknowns at most.
-inline constexpr int kMostTurnedCoefficients = 2048;
-
 struct LevelSet {
-  // Tiles of w / 2^level texels, each a BTFel of its own, in the order of the texels; no source pixels, seams
-  // or certificate.
+  // No seams or certificate. Of level 1 the tile set's own texels.
   TileSet tile_set;
-  // RMSE against the level with its parts, in reflectance, over texels spread over the tiles and a few
-  // measured directions: of the turning and, where texels had several parts, of 8 bits.
+  // RMSE of texels of the level, in reflectance, over some spread over the tiles and a few measured
+  // directions: of moved seams and of 8 bits.
   double rmse = 0.0;
 };
 
-// Cost: MakeTileMips. Errors: its; INVALID_ARGUMENT naming a level that the tile size does not have;
-// RESOURCE_EXHAUSTED naming kMostTurnedCoefficients, or the 1 GiB that its texels would pass; CANCELLED.
+// Cost: a pass over the coefficients of all pixels of cells. Errors: INVALID_ARGUMENT naming a level that the
+// tile size does not have; FAILED_PRECONDITION where the tile set does not say where its BTFels lie in the
+// exemplar; those of MakeDecoder; CANCELLED.
 [[nodiscard]] absl::StatusOr<LevelSet> MakeLevelSet(const TileSet& tile_set, int level,
                                                     const RunContext& context);
 

@@ -64,8 +64,9 @@ std::vector<float> FillOf(const CoefficientTables& tables, const FloatRows& valu
 
 }  // namespace
 
-absl::StatusOr<Refinement> MakeRefinement(const BtfelTable& table, const RefinementOptions& options,
+absl::StatusOr<Refinement> MakeRefinement(const TileSet& tile_set, const RefinementOptions& options,
                                           const RunContext& context) {
+  const BtfelTable& table = tile_set.btfels;
   TESSERA_ASSIGN_OR_RETURN(const std::unique_ptr<Decoder> decoder, MakeDecoder(table));
   TESSERA_ASSIGN_OR_RETURN(const CoefficientTables tables, CoefficientTables::Of(table));
   const SceneCases cases = MakeSceneCases(*decoder, table, options.light);
@@ -73,18 +74,17 @@ absl::StatusOr<Refinement> MakeRefinement(const BtfelTable& table, const Refinem
   Refinement refinement;
   refinement.directions = cases.directions;
   TileSetCut& cut = refinement.cut;
-  if (options.level_tile_size > 0) {
+  if (options.level > 0) {
     TESSERA_ASSIGN_OR_RETURN(
         SetLayers layers,
-        MakeSetLayers(table, {.block_side = options.level_tile_size, .exact = {}, .light = options.light},
-                      context));
+        MakeSetLayers(tile_set, {.level = options.level, .exact = {}, .light = options.light}, context));
     cut.fill.assign(k, 0.0F);
     cut.layers = std::move(layers.layers);
     refinement.rmse = std::move(layers.rmse);
     return refinement;
   }
   TESSERA_RETURN_IF_ERROR(context.CheckStop());
-  const FloatRows values = CoefficientsOf(table, Spread(table.size(), kRefineBtfels));
+  const FloatRows values = CoefficientsOf(table, SampleTexels(tile_set, 0).btfels);
   const FloatRows whole = values * cases.weights.transpose();
   cut.fill = FillOf(tables, values);
   const Eigen::Map<const Eigen::RowVectorXf> fill(cut.fill.data(), static_cast<Eigen::Index>(k));
@@ -119,9 +119,8 @@ absl::StatusOr<Refinement> MakeRefinement(const BtfelTable& table, const Refinem
   cut.ends = EndsAroundLayers(table);
   refinement.rmse.push_back(rmse_of(cut.ends[0]));
   TESSERA_RETURN_IF_ERROR(context.CheckStop());
-  TESSERA_ASSIGN_OR_RETURN(SetLayers layers, MakeSetLayers(table,
-                                                           {.block_side = 1,
-                                                            .exact = std::span(cut.order).first(cut.ends[0]),
+  TESSERA_ASSIGN_OR_RETURN(SetLayers layers, MakeSetLayers(tile_set,
+                                                           {.exact = std::span(cut.order).first(cut.ends[0]),
                                                             .rmse = refinement.rmse.back(),
                                                             .light = options.light},
                                                            context));

@@ -10,7 +10,7 @@
 // A coefficient's energy is the sum over cases of its weight^2, times its variance about its fill over the
 // BTFels: what leaving it out alone costs in reflectance.
 //
-//   TESSERA_ASSIGN_OR_RETURN(Refinement refinement, MakeRefinement(tile_set.btfels, {}, context));
+//   TESSERA_ASSIGN_OR_RETURN(Refinement refinement, MakeRefinement(tile_set, {}, context));
 //   refinement.cut.tiles = ..;
 #pragma once
 
@@ -20,8 +20,8 @@
 #include <absl/status/statusor.h>
 
 #include "btf/base/run_context.h"
-#include "btf/codec/btfel_table.h"
 #include "btf/codec/scene_light.h"
+#include "btf/wang/tile_set.h"
 #include "btf/wang/tile_set_parts.h"
 
 namespace tessera {
@@ -30,22 +30,21 @@ namespace tessera {
 inline constexpr size_t kExactPartBytes = size_t{4} << 20;
 
 struct RefinementOptions {
-  // Of a level, the side of its tiles: its BTFels are its texels (level_set.h). 0: a tile set.
-  int level_tile_size = 0;
+  int level = 0;  // of a set that MakeLevelSet made, its level
   SceneLight light = SceneLight::kPoint;
 };
 
 struct Refinement {
   TileSetCut cut;  // of all tiles
-  // Of each prefix, RMSE over RGB in reflectance, clamped at 0, against all coefficients, of BTFels spread
-  // evenly over the table, each in its own frame, over the cases of scene_cases.h. Never rises; 0 at the last
+  // Of each prefix, RMSE over RGB in reflectance, clamped at 0, against all coefficients, of texels of the
+  // level spread over the tiles (SampleTexels), over the cases of scene_cases.h. Never rises; 0 at the last
   // part of a tile set.
   std::vector<double> rmse;
   std::string directions;  // the cases, in words
 };
 
 // Same arguments, same result. Errors: MakeDecoder's; those of MakeSetLayers; CANCELLED.
-[[nodiscard]] absl::StatusOr<Refinement> MakeRefinement(const BtfelTable& table,
+[[nodiscard]] absl::StatusOr<Refinement> MakeRefinement(const TileSet& tile_set,
                                                         const RefinementOptions& options,
                                                         const RunContext& context);
 

@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <optional>
 #include <span>
 
 #include <absl/strings/str_cat.h>
@@ -15,6 +16,7 @@ namespace tessera {
 namespace {
 
 constexpr int kSkyFunctions = 9;
+constexpr double kGoldenSection = 0.6180339887498949;
 
 // Weights [3 * cases][k]: a row for each channel of each case.
 class CaseWeights {
@@ -51,7 +53,6 @@ void AddPointCases(const Decoder& decoder, const BtfelTable& table, int lights_p
   const size_t num_lights = table.lights.size();
   const std::vector<size_t> views = Spread(table.views.size(), kRefineViews);
   // Steps of the golden section visit the lights evenly, whatever their order.
-  constexpr double kGoldenSection = 0.6180339887498949;
   double at = 0.5;
   for (const size_t view : views) {
     for (int i = 0; i < lights_per_view; ++i) {
@@ -99,6 +100,16 @@ std::vector<size_t> Spread(size_t count, size_t most) {
   return indices;
 }
 
+std::vector<size_t> Scatter(size_t count, size_t most) {
+  std::vector<size_t> indices;
+  double share = 0.5;
+  for (size_t i = 0; i < std::min(count, most); ++i) {
+    indices.push_back(std::min(static_cast<size_t>(share * static_cast<double>(count)), count - 1));
+    share = std::fmod(share + kGoldenSection, 1.0);
+  }
+  return indices;
+}
+
 SceneCases MakeSceneCases(const Decoder& decoder, const BtfelTable& table, SceneLight light,
                           int lights_per_view) {
   CaseWeights cases(table.num_coefficients);
@@ -112,15 +123,37 @@ SceneCases MakeSceneCases(const Decoder& decoder, const BtfelTable& table, Scene
   return {cases.matrix(), absl::StrCat(num_views, " measured views in 5 soft lights")};
 }
 
-FloatRows CoefficientsOf(const BtfelTable& table, const std::vector<size_t>& btfels) {
-  FloatRows values(static_cast<Eigen::Index>(btfels.size()), table.num_coefficients);
-  for (size_t row = 0; row < btfels.size(); ++row) {
-    const auto codes = table.btfel(btfels[row]);
-    for (size_t i = 0; i < codes.size(); ++i) {
-      values(static_cast<Eigen::Index>(row), static_cast<Eigen::Index>(i)) =
-          table.offset[i] + table.step[i] * static_cast<float>(codes[i]);
+SampledTexels SampleTexels(const TileSet& tile_set, int level) {
+  const std::optional<SourceGrid> grid = SourceGridOf(tile_set);
+  const int side = std::max((1 << level) / (grid.has_value() ? grid->footprint : 1), 1);
+  const auto across = static_cast<size_t>(tile_set.tile_size / side);
+  SampledTexels sampled{.btfels = {}, .per_row = static_cast<size_t>(side) * static_cast<size_t>(side)};
+  for (const size_t at : Scatter(tile_set.tile_codes.size() * across * across, kRefineTexels)) {
+    const auto tile = static_cast<int>(at / (across * across));
+    const int left = static_cast<int>(at % across) * side;
+    const int top = static_cast<int>(at / across % across) * side;
+    for (int i = 0; i < side * side; ++i) {
+      sampled.btfels.push_back(BtfelOfTexel(tile_set.texel(tile, left + i % side, top + i / side)));
     }
   }
+  return sampled;
+}
+
+FloatRows CoefficientsOf(const BtfelTable& table, std::span<const uint32_t> btfels, size_t per_row) {
+  FloatRows values =
+      FloatRows::Zero(static_cast<Eigen::Index>(btfels.size() / per_row), table.num_coefficients);
+  for (size_t i = 0; i < btfels.size(); ++i) {
+    const auto codes = table.btfel(btfels[i]);
+    auto row = values.row(static_cast<Eigen::Index>(i / per_row));
+    for (size_t c = 0; c < codes.size(); ++c) {
+      row[static_cast<Eigen::Index>(c)] += static_cast<float>(codes[c]);
+    }
+  }
+  const auto k = static_cast<Eigen::Index>(table.step.size());
+  const Eigen::Map<const Eigen::RowVectorXf> step(table.step.data(), k);
+  const Eigen::Map<const Eigen::RowVectorXf> offset(table.offset.data(), k);
+  values = values.array().rowwise() * (step / static_cast<float>(per_row)).array();
+  values.rowwise() += offset;
   return values;
 }
 

@@ -1,13 +1,12 @@
 #include "btf/refine/set_layers.h"
 
 #include <algorithm>
-#include <cfloat>
+#include <array>
 #include <cmath>
 #include <cstdint>
-#include <limits>
-#include <map>
 #include <numeric>
 #include <optional>
+#include <set>
 #include <span>
 #include <utility>
 
@@ -17,6 +16,7 @@
 #include "btf/codec/coefficient_tables.h"
 #include "btf/codec/decoder.h"
 #include "btf/math/truncated_svd.h"
+#include "btf/refine/core_coder.h"
 #include "btf/refine/scene_cases.h"
 
 namespace tessera {
@@ -28,22 +28,27 @@ constexpr int kLightsPerView = 8;
 constexpr float kFirstStep = 1.0F / 16.0F;
 // What a step leaves lies evenly within half of it on either side: thirds of it spend their bits best.
 constexpr float kStepRatio = 3.0F;
-constexpr float kLastStep = 1.0F / 4096.0F;
+constexpr float kLastStep = 1.0F / 16384.0F;
 // The first of the components that so many blocks make matter most, and are found best.
-constexpr int kBlocks = 4;
+constexpr int kBlocks = 6;
 constexpr Eigen::Index kBlockComponents = kMostComponents / kBlocks;
 // Components and tables are as exact as images of this step, so that later layers need not mend them.
 constexpr float kSharedStep = 1.0F / 1024.0F;
-// Tables with fewer entries for a coefficient hold offsets and steps, which are not rounded.
-constexpr size_t kLeastRoundedEntries = 16;
 // Codes are 0 up to this many steps more than one half: small ones cost more than they save.
 constexpr double kDeadZone = 0.1;
 // Squared error that a byte of images saves, in squares of the step: twice ln 2 a bit, of step^2 / 12.
 constexpr double kSquaresPerByte = 0.92;
 constexpr double kBytesPerBasisCode = 0.6;
-constexpr double kBytesPerEntry = 0.5;
 constexpr double kBytesPerComponent = 16.0;
+// An error that is the same all over the tiles changes their colour, and is seen so many times better than
+// what differs from texel to texel.
+constexpr double kMeanWeight = 4.0;
+constexpr float kLeastCoreStep = 0.0005F;
+constexpr float kTrial = 8.0F;
 constexpr size_t kRows = 1024;
+// Few enough blocks that smooth images need few cosines, and small enough ones for their transform to be
+// quick.
+constexpr int kBlockSide = 64;
 
 // The principal components of some coefficients.
 struct Components {
@@ -54,8 +59,10 @@ struct Components {
 
 FloatRows ColumnsOf(const FloatRows& from, std::span<const uint32_t> columns) {
   FloatRows to(from.rows(), static_cast<Eigen::Index>(columns.size()));
-  for (size_t i = 0; i < columns.size(); ++i) {
-    to.col(static_cast<Eigen::Index>(i)) = from.col(columns[i]);
+  for (Eigen::Index row = 0; row < from.rows(); ++row) {
+    for (size_t i = 0; i < columns.size(); ++i) {
+      to(row, static_cast<Eigen::Index>(i)) = from(row, columns[i]);
+    }
   }
   return to;
 }
@@ -87,23 +94,113 @@ Components PrincipalComponents(const FloatRows& values, const FloatRows& weights
   return components;
 }
 
+// Of the whole exemplar where pixels are known.
+LayerBlocks BlocksOfSet(const TileSet& tile_set, int level) {
+  if (const std::optional<SourceGrid> grid = SourceGridOf(tile_set)) {
+    return BlocksOf(tile_set.source_pixels, *grid, kBlockSide, level);
+  }
+  std::vector<uint32_t> numbers(tile_set.btfels.size());
+  std::iota(numbers.begin(), numbers.end(), 0U);
+  return BlocksOf(numbers, {}, 1, level);
+}
+
+// Pixels of blocks that no BTFel has: what is best there is what costs fewest cosines, so values go on into
+// them from all sides.
+class Gaps {
+ public:
+  explicit Gaps(const LayerBlocks& blocks) {
+    const auto side = static_cast<uint32_t>(blocks.side);
+    std::vector<bool> is_known(blocks.num_pixels(), false);
+    for (const uint32_t place : blocks.places) {
+      is_known[place] = true;
+    }
+    std::vector<uint32_t> last(blocks.places.begin(), blocks.places.end());
+    while (!last.empty()) {
+      std::vector<uint32_t> found;
+      for (const uint32_t place : last) {
+        ForNeighbours(place, side, [&](uint32_t neighbour) {
+          if (!is_known[neighbour]) {
+            found.push_back(neighbour);
+          }
+        });
+      }
+      std::ranges::sort(found);
+      found.erase(std::ranges::unique(found).begin(), found.end());
+      for (const uint32_t place : found) {
+        Gap gap{.place = place};
+        ForNeighbours(place, side, [&](uint32_t neighbour) {
+          if (is_known[neighbour]) {
+            gap.from[gap.count++] = neighbour;
+          }
+        });
+        gaps_.push_back(gap);
+      }
+      for (const uint32_t place : found) {
+        is_known[place] = true;
+      }
+      last = std::move(found);
+    }
+  }
+
+  // `image` is [pixels of blocks].
+  void Fill(std::vector<float>& image) const {
+    for (const Gap& gap : gaps_) {
+      float sum = 0.0F;
+      for (size_t i = 0; i < gap.count; ++i) {
+        sum += image[gap.from[i]];
+      }
+      image[gap.place] = sum / static_cast<float>(gap.count);
+    }
+  }
+
+ private:
+  // Its value is the mean of those of `from`.
+  struct Gap {
+    uint32_t place = 0;
+    size_t count = 0;
+    std::array<uint32_t, 4> from = {};
+  };
+
+  template <typename Body>
+  static void ForNeighbours(uint32_t place, uint32_t side, const Body& body) {
+    const uint32_t x = place % side;
+    const uint32_t y = place / side % side;
+    if (x > 0) {
+      body(place - 1);
+    }
+    if (x + 1 < side) {
+      body(place + 1);
+    }
+    if (y > 0) {
+      body(place - side);
+    }
+    if (y + 1 < side) {
+      body(place + side);
+    }
+  }
+
+  std::vector<Gap> gaps_;
+};
+
 // The layers so far, and what more may come.
 class LayerCoder {
  public:
-  static absl::StatusOr<LayerCoder> Create(const BtfelTable& table, const SetLayersOptions& options,
+  static absl::StatusOr<LayerCoder> Create(const TileSet& tile_set, const SetLayersOptions& options,
                                            const RunContext& context) {
-    LayerCoder coder(table, options);
+    LayerCoder coder(tile_set, options);
     TESSERA_RETURN_IF_ERROR(coder.Measure());
     TESSERA_RETURN_IF_ERROR(context.CheckStop());
+    TESSERA_RETURN_IF_ERROR(coder.FindCandidates(context));
     return coder;
   }
 
   absl::StatusOr<SetLayers> Run(const RunContext& context) {
     for (float step = kFirstStep; step >= kLastStep && rmse_ > kLayersEndRmse; step /= kStepRatio) {
-      if (!taken_.empty()) {
+      const bool is_first = !sum_.has_value();
+      TESSERA_RETURN_IF_ERROR(AddLayer(step, Brings::kComponents, context));
+      if (!is_first) {
         TESSERA_RETURN_IF_ERROR(AddLayer(step, Brings::kFinerImages, context));
       }
-      TESSERA_RETURN_IF_ERROR(AddLayer(step, Brings::kComponents, context));
     }
     result_.layers = std::make_shared<const TileSetLayers>(std::move(layers_));
     return std::move(result_);
@@ -112,25 +209,30 @@ class LayerCoder {
  private:
   enum class Brings { kFinerImages, kComponents };
 
-  // A component that may come: its coefficients' layer, its basis, its image's cosines [frequency][block].
+  // A component that may come: its basis, its image's cosines [frequency][block].
   struct Candidate {
-    uint32_t span = 0;
     float basis_step = 0.0F;
     std::vector<int32_t> basis;
     std::vector<float> cosines;
   };
 
-  LayerCoder(const BtfelTable& table, const SetLayersOptions& options)
-      : table_(table),
+  LayerCoder(const TileSet& tile_set, const SetLayersOptions& options)
+      : table_(tile_set.btfels),
         options_(options),
-        frequencies_(BlockFrequencies(options.block_side)),
-        transform_(options.block_side),
+        samples_(SampleTexels(tile_set, options.level)),
+        blocks_(BlocksOfSet(tile_set, options.level)),
+        gaps_(blocks_),
+        factors_(blocks_.StepFactors()),
+        transform_(blocks_.side),
         rmse_(options.rmse) {}
 
   [[nodiscard]] size_t num_btfels() const { return table_.size(); }
-  [[nodiscard]] size_t num_blocks() const { return table_.size() / frequencies_.size(); }
+  // What of a squared error in cosines is one of BTFels.
+  [[nodiscard]] double SquaredUnit(float step) const {
+    return static_cast<double>(step) * step * blocks_.footprint * blocks_.footprint;
+  }
   [[nodiscard]] size_t most_components() const {
-    return std::min(kMostLayerComponents, kMostLayerValues / std::max<size_t>(num_btfels(), 1));
+    return std::min(kMostLayerComponents, kMostLayerValues / std::max<size_t>(blocks_.num_pixels(), 1));
   }
 
   absl::Status Measure() {
@@ -142,13 +244,17 @@ class LayerCoder {
     for (const uint32_t coefficient : options_.exact) {
       held_[coefficient] = true;
     }
-    const std::vector<size_t> sampled = Spread(num_btfels(), kRefineBtfels);
-    sampled_.assign(sampled.begin(), sampled.end());
-    values_ = CoefficientsOf(table_, sampled);
+    values_ = CoefficientsOf(table_, samples_.btfels, samples_.per_row);
     whole_ = values_ * error_weights_.transpose();
-    layers_.block_side = options_.block_side;
+    layers_.block_side = blocks_.side;
+    layers_.level = blocks_.level;
     if (options_.exact.empty()) {
-      TESSERA_RETURN_IF_ERROR(RoundTables());
+      TESSERA_RETURN_IF_ERROR(MakeCores());
+    }
+    for (uint32_t c = 0; c < held_.size(); ++c) {
+      if (!held_[c]) {
+        layers_.coefficients.push_back(c);
+      }
     }
     const Eigen::RowVectorXf mean = values_.colwise().mean();
     layers_.mean.assign(mean.begin(), mean.end());
@@ -158,110 +264,77 @@ class LayerCoder {
     for (const float each : weight) {
       layers_.scale.push_back(each > 0.0F ? 1.0F / each : 0.0F);
     }
-    // In the mean over BTFels and cases: squares of the coefficient's mean, and of what differs from it.
-    mean_squares_ = mean.cwiseAbs2().cwiseProduct(weight.cwiseAbs2());
-    squares_ = values_.colwise().squaredNorm().cwiseProduct(weight.cwiseAbs2()) /
-               static_cast<float>(std::max<Eigen::Index>(values_.rows(), 1));
     return absl::OkStatus();
   }
 
-  // The table with the entries of each coefficient rounded to multiples of 2^bits, of f32 in the last place.
-  [[nodiscard]] CodecTable Rounded(const std::string& name, const CodecTable& table,
-                                   std::span<const int> bits) const {
-    CodecTable rounded = table;
-    std::vector<int> of_entry(table.values.size(), std::numeric_limits<int>::max());
-    for (uint32_t c = 0; c < bits.size(); ++c) {
-      for (const int64_t entry : tables_->EntriesOf(name, std::span(&c, 1), {})) {
-        int& least = of_entry[static_cast<size_t>(entry)];
-        least = std::min(least, bits[c]);
-      }
-    }
-    for (size_t i = 0; i < of_entry.size(); ++i) {
-      float& value = rounded.values[i];
-      if (of_entry[i] == std::numeric_limits<int>::max() || value == 0.0F) {
-        continue;
-      }
-      const int last_place = table.dtype == DType::kF32 ? std::ilogb(value) - (FLT_MANT_DIG - 1) : 0;
-      const double unit = std::ldexp(1.0, last_place + of_entry[i]);
-      const double most =
-          table.dtype == DType::kF32 ? FLT_MAX : std::ldexp(1.0, 8 * DTypeSize(table.dtype)) - unit;
-      value = static_cast<float>(std::min(std::round(value / unit), std::floor(most / unit)) * unit);
-    }
-    return rounded;
-  }
-
-  // Tables rounded so that each coefficient errs by about kSharedStep's error, and the weights that they
-  // give. The error grows as the unit does: rounding a little tells how much more is allowed.
-  absl::Status RoundTables() {
-    BtfelTable table = table_.WithoutCodes();
-    std::map<std::string, CodecTable>& rounded = layers_.tables;
-    std::vector<std::string> names;
-    for (const auto& [name, codec_table] : table.tables) {
-      if (tables_->IsSplit(name) && codec_table.values.size() >= kLeastRoundedEntries * held_.size()) {
-        names.push_back(name);
-      }
-    }
-    if (names.empty()) {
+  // Tables by views and lights, each matrix by what an error in it costs: how far weights move where every
+  // number of the tables moves by kTrial.
+  absl::Status MakeCores() {
+    std::vector<AngularTable> angular = AngularTablesOf(table_, *tables_);
+    if (angular.empty()) {
       return absl::OkStatus();
     }
-    const Eigen::RowVectorXf size =
-        (values_.colwise().squaredNorm() / static_cast<float>(values_.rows())).cwiseSqrt();
-    std::vector<int> bits(held_.size(), 3);
-    for (const bool is_trial : {true, false}) {
-      for (const std::string& name : names) {
-        const CodecTable& exact = table_.tables.at(name);
-        rounded[name] = Rounded(name, exact, bits);
-        table.tables[name] = rounded[name];
-      }
-      TESSERA_ASSIGN_OR_RETURN(const std::unique_ptr<Decoder> decoder, MakeDecoder(table));
-      const FloatRows weights = MakeSceneCases(*decoder, table, options_.light, kLightsPerView).weights;
-      if (is_trial) {
-        const float allowed = kSharedStep / std::sqrt(12.0F);
-        for (size_t c = 0; c < bits.size(); ++c) {
-          const auto column = static_cast<Eigen::Index>(c);
-          const float error = size[column] * (weights.col(column) - weights_.col(column)).norm() /
-                              std::sqrt(static_cast<float>(weights.rows()));
-          bits[c] += error > 0.0F ? static_cast<int>(std::floor(std::log2(allowed / error))) : 0;
-          bits[c] = std::clamp(bits[c], 0, 20);
-        }
-      } else {
-        weights_ = weights;
-        error_weights_ = MakeSceneCases(*decoder, table, options_.light).weights;
+    BtfelTable trial = table_.WithoutCodes();
+    for (const AngularTable& each : angular) {
+      CodecTable& table = trial.tables.at(each.name);
+      const float most = table.dtype == DType::kU8 ? 255.0F : 65535.0F;
+      for (size_t i = 0; i < table.values.size(); ++i) {
+        // Up and down without a pattern, and inwards where there is no room.
+        const bool is_up = (i * size_t{2654435761} >> 16) % 2 == 0;
+        float& value = table.values[i];
+        value += (is_up || value < kTrial) && value + kTrial <= most ? kTrial : -kTrial;
       }
     }
+    TESSERA_ASSIGN_OR_RETURN(const std::unique_ptr<Decoder> decoder, MakeDecoder(trial));
+    const FloatRows moved =
+        MakeSceneCases(*decoder, trial, options_.light, kLightsPerView).weights - weights_;
+    const Eigen::RowVectorXf size =
+        (values_.colwise().squaredNorm() / static_cast<float>(values_.rows())).cwiseSqrt();
+    std::vector<double> squares;
+    for (const AngularTable& each : angular) {
+      const size_t first = squares.size();
+      squares.resize(first + each.num_matrices(), 0.0);
+      const size_t angles = table_.views.size() * table_.lights.size();
+      for (uint32_t c = 0; c < held_.size(); ++c) {
+        std::set<size_t> matrices;
+        for (const int64_t entry : tables_->EntriesOf(each.name, std::span(&c, 1), {})) {
+          const size_t cell = static_cast<size_t>(entry) / each.after_count;
+          matrices.insert(cell / angles * each.after_count + static_cast<size_t>(entry) % each.after_count);
+        }
+        const auto column = static_cast<Eigen::Index>(c);
+        const double error = static_cast<double>(size[column]) * moved.col(column).norm() / kTrial;
+        for (const size_t matrix : matrices) {
+          squares[first + matrix] +=
+              error * error / static_cast<double>(moved.rows()) / static_cast<double>(matrices.size());
+        }
+      }
+    }
+    std::vector<double> costs(squares.size());
+    std::ranges::transform(squares, costs.begin(), [](double square) { return std::sqrt(square); });
+    TESSERA_ASSIGN_OR_RETURN(cores_, CoreCoder::Create(table_, std::move(angular), costs));
+    layers_.bases = cores_->bases();
     return absl::OkStatus();
   }
 
-  // Those that need no entries in the first layer, the others once they are worth them.
-  [[nodiscard]] std::vector<uint32_t> NewCoefficients(float step) const {
-    std::vector<uint32_t> coefficients;
-    for (uint32_t c = 0; c < held_.size(); ++c) {
-      if (held_[c]) {
-        continue;
-      }
-      if (!tables_->NeedsEntries(c)) {
-        coefficients.push_back(c);
-        continue;
-      }
-      double entries = 0.0;
-      for (const auto& [name, table] : table_.tables) {
-        if (tables_->IsSplit(name)) {
-          entries += static_cast<double>(tables_->EntriesOf(name, std::span(&c, 1), {}).size());
-        }
-      }
-      const double saved =
-          mean_squares_[c] + std::max(0.0, static_cast<double>(squares_[c]) - step * step / 12.0);
-      if (saved * static_cast<double>(num_btfels()) >
-          kSquaresPerByte * step * step * kBytesPerEntry * entries) {
-        coefficients.push_back(c);
-      }
-    }
-    return coefficients;
+  // The codes that make tables as fine as images of this step, and what errors weigh with these tables. A
+  // number of a core is seen in the mean over so many others, as a cosine is over pixels, but the same all
+  // over the tiles.
+  absl::Status AddCores(float step, TileSetLayer& layer) {
+    const double seen = std::sqrt(static_cast<double>(table_.views.size() * table_.lights.size()) /
+                                  static_cast<double>(blocks_.num_pixels()));
+    layer.core_step =
+        std::max(kLeastCoreStep, step * static_cast<float>(blocks_.footprint * seen / kMeanWeight));
+    layer.cores = cores_->Finer(layer.core_step);
+    BtfelTable table = table_.WithoutCodes();
+    cores_->sum().Write(table.tables);
+    TESSERA_ASSIGN_OR_RETURN(const std::unique_ptr<Decoder> decoder, MakeDecoder(table));
+    error_weights_ = MakeSceneCases(*decoder, table, options_.light).weights;
+    return absl::OkStatus();
   }
 
-  // The components of these coefficients, with their images over all BTFels.
-  absl::Status AddCandidates(std::span<const uint32_t> coefficients, uint32_t span,
-                             const RunContext& context) {
+  // The components, with their images over all BTFels.
+  absl::Status FindCandidates(const RunContext& context) {
+    const std::vector<uint32_t>& coefficients = layers_.coefficients;
     const Components found =
         PrincipalComponents(ColumnsOf(values_, coefficients), ColumnsOf(weights_, coefficients),
                             std::min<size_t>(kMostComponents, most_components()));
@@ -273,14 +346,14 @@ class LayerCoder {
     FloatRows images(static_cast<Eigen::Index>(num_btfels()), count);
     for (size_t begin = 0; begin < num_btfels(); begin += kRows) {
       TESSERA_RETURN_IF_ERROR(context.CheckStop());
-      std::vector<size_t> btfels(std::min(kRows, num_btfels() - begin));
-      std::iota(btfels.begin(), btfels.end(), begin);
+      std::vector<uint32_t> btfels(std::min(kRows, num_btfels() - begin));
+      std::iota(btfels.begin(), btfels.end(), static_cast<uint32_t>(begin));
       FloatRows values = ColumnsOf(CoefficientsOf(table_, btfels), coefficients);
       values.rowwise() -= mean;
       images.middleRows(static_cast<Eigen::Index>(begin), values.rows()) = values * found.project;
     }
     for (Eigen::Index c = 0; c < count; ++c) {
-      Candidate candidate{.span = span};
+      Candidate candidate;
       // So that all its codes together err as an image of kSharedStep does.
       candidate.basis_step =
           kSharedStep / (found.size[c] * std::sqrt(static_cast<float>(coefficients.size())));
@@ -291,8 +364,12 @@ class LayerCoder {
                                : 0.0F;
         candidate.basis.push_back(static_cast<int32_t>(std::lround(code)));
       }
-      const Eigen::VectorXf image = images.col(c);
-      candidate.cosines = transform_.Forward(std::span(image.data(), num_btfels()));
+      std::vector<float> image(blocks_.num_pixels(), 0.0F);
+      for (size_t btfel = 0; btfel < num_btfels(); ++btfel) {
+        image[blocks_.places[btfel]] = images(static_cast<Eigen::Index>(btfel), c);
+      }
+      gaps_.Fill(image);
+      candidate.cosines = transform_.Forward(image);
       candidates_.push_back(std::move(candidate));
     }
     return absl::OkStatus();
@@ -304,7 +381,7 @@ class LayerCoder {
     std::vector<int32_t> codes(wanted.size());
     double saved = 0.0;
     for (size_t i = 0; i < wanted.size(); ++i) {
-      const double unit = step * StepFactor(frequencies_[i / num_blocks()], options_.block_side);
+      const double unit = step * factors_[i / blocks_.size()];
       const double left = wanted[i] - (held.empty() ? 0.0F : held[i]);
       const double size = std::floor(std::abs(left) / unit + 0.5 - kDeadZone);
       codes[i] = static_cast<int32_t>(std::copysign(size, left));
@@ -316,21 +393,13 @@ class LayerCoder {
   // One of this step, where it lowers the error.
   absl::Status AddLayer(float step, Brings brings, const RunContext& context) {
     TESSERA_RETURN_IF_ERROR(context.CheckStop());
+    const bool is_first = !sum_.has_value();
     TileSetLayer layer{.step = step};
-    if (brings == Brings::kComponents) {
-      layer.coefficients = NewCoefficients(step);
-    }
-    const size_t candidates_before = candidates_.size();
-    if (!layer.coefficients.empty()) {
-      TESSERA_RETURN_IF_ERROR(
-          AddCandidates(layer.coefficients, static_cast<uint32_t>(layers_.layers.size()), context));
-    }
-    LayerSum sum =
-        sum_.has_value() ? *sum_ : LayerSum(options_.block_side, num_blocks(), layers_.mean, layers_.scale);
+    LayerSum sum = is_first ? LayerSum(blocks_, layers_.coefficients, layers_.mean, layers_.scale) : *sum_;
     for (size_t c = 0; c < taken_.size(); ++c) {
       const auto codes = brings == Brings::kFinerImages
                              ? Coded(candidates_[taken_[c]].cosines, sum.cosines(c), step).first
-                             : std::vector<int32_t>(num_btfels(), 0);
+                             : std::vector<int32_t>(blocks_.num_pixels(), 0);
       layer.codes.insert(layer.codes.end(), codes.begin(), codes.end());
     }
     std::vector<size_t> taken = taken_;
@@ -342,29 +411,21 @@ class LayerCoder {
       const auto [codes, saved] = Coded(candidate.cosines, {}, step);
       const double bytes =
           kBytesPerComponent + kBytesPerBasisCode * static_cast<double>(candidate.basis.size());
-      if (saved > kSquaresPerByte * step * step * bytes) {
+      if (saved > kSquaresPerByte * SquaredUnit(step) * bytes) {
         taken.push_back(c);
-        layer.spans.push_back(candidate.span);
         layer.basis_step.push_back(candidate.basis_step);
         layer.basis.insert(layer.basis.end(), candidate.basis.begin(), candidate.basis.end());
         layer.codes.insert(layer.codes.end(), codes.begin(), codes.end());
       }
     }
     TESSERA_RETURN_IF_ERROR(sum.Add(layer));
-    const auto hold = [&](bool held) {
-      for (const uint32_t coefficient : layer.coefficients) {
-        held_[coefficient] = held;
-      }
-    };
-    hold(true);
+    std::optional<CoreCoder> cores = cores_;
+    if (cores.has_value() && brings == Brings::kComponents) {
+      TESSERA_RETURN_IF_ERROR(AddCores(step, layer));
+    }
     const double rmse = RmseOf(ReflectedBy(sum), whole_);
-    // A first layer without coefficients that mean anything would be black.
-    const bool is_first = layers_.layers.empty() && options_.exact.empty();
-    const bool is_last_chance = is_first && step / kStepRatio < kLastStep;
-    const bool is_worth_it = is_first ? !layer.coefficients.empty() || is_last_chance : rmse < rmse_;
-    if (!is_worth_it) {
-      hold(false);
-      candidates_.resize(candidates_before);
+    if (rmse >= rmse_) {
+      cores_ = std::move(cores);
       return absl::OkStatus();
     }
     taken_ = std::move(taken);
@@ -375,15 +436,10 @@ class LayerCoder {
     return absl::OkStatus();
   }
 
-  // What the sampled BTFels reflect: coefficients that are not here have no entries, and reflect nothing.
+  // What the sampled texels reflect.
   [[nodiscard]] FloatRows ReflectedBy(const LayerSum& sum) const {
-    const std::vector<float> sums = sum.Coefficients(sampled_);
+    const std::vector<float> sums = sum.Coefficients(samples_.btfels, samples_.per_row);
     FloatRows values = Eigen::Map<const FloatRows>(sums.data(), values_.rows(), values_.cols());
-    for (uint32_t c = 0; c < held_.size(); ++c) {
-      if (!held_[c]) {
-        values.col(c).setZero();
-      }
-    }
     for (const uint32_t c : options_.exact) {
       values.col(c) = values_.col(c).array() + layers_.mean[c];
     }
@@ -392,19 +448,20 @@ class LayerCoder {
 
   const BtfelTable& table_;
   SetLayersOptions options_;
-  std::vector<BlockFrequency> frequencies_;
+  SampledTexels samples_;
+  LayerBlocks blocks_;
+  Gaps gaps_;
+  std::vector<float> factors_;  // [frequency]
   BlockCosines transform_;
   std::optional<CoefficientTables> tables_;
-  std::vector<uint32_t> sampled_;
   FloatRows weights_;        // [3 * cases][k], over the root of their number
   FloatRows error_weights_;  // of the cases over which errors are measured, as they are
   FloatRows values_;         // [sampled][k], less the mean
   FloatRows whole_;          // [sampled][3 * cases], what they reflect
-  Eigen::RowVectorXf mean_squares_;
-  Eigen::RowVectorXf squares_;
-  std::vector<bool> held_;             // [k]
-  std::vector<Candidate> candidates_;  // of the coefficients held
-  std::vector<size_t> taken_;          // [component], the candidate that it is
+  std::vector<bool> held_;   // [k], exact
+  std::optional<CoreCoder> cores_;
+  std::vector<Candidate> candidates_;
+  std::vector<size_t> taken_;  // [component], the candidate that it is
   std::optional<LayerSum> sum_;
   TileSetLayers layers_;
   double rmse_;
@@ -413,9 +470,9 @@ class LayerCoder {
 
 }  // namespace
 
-absl::StatusOr<SetLayers> MakeSetLayers(const BtfelTable& table, const SetLayersOptions& options,
+absl::StatusOr<SetLayers> MakeSetLayers(const TileSet& tile_set, const SetLayersOptions& options,
                                         const RunContext& context) {
-  TESSERA_ASSIGN_OR_RETURN(LayerCoder coder, LayerCoder::Create(table, options, context));
+  TESSERA_ASSIGN_OR_RETURN(LayerCoder coder, LayerCoder::Create(tile_set, options, context));
   return coder.Run(context);
 }
 

@@ -427,7 +427,8 @@ absl::Status CertifyTileSet(const Material& original, CertificateImages which, c
   const Material& material = recoloured ? *recoloured : original;
   const BtfelTable& own = tile_set.btfels;
   const BtfelTable& exemplar_table = material.btfels;
-  if (tile_set.source_pixels.empty()) {
+  const std::optional<SourceGrid> grid = SourceGridOf(tile_set);
+  if (tile_set.source_pixels.empty() || (grid.has_value() && grid->footprint != 1)) {
     return absl::FailedPreconditionError(
         "the tile set does not record where its BTFels lie in the exemplar: synthesise it again");
   }

@@ -20,7 +20,7 @@ namespace tessera {
 
 struct SceneNeeds {
   std::vector<uint32_t> tiles;  // indices into the arrangement's list; none: all
-  int level = 0;                // mip level, tiles of w / 2^level texels; 0: the tile set itself
+  int level = 0;                // the finest mip level that it shows; 0: the tile set itself
   // RMSE against all coefficients of the level, in reflectance, over directions that the plan states: the
   // fewest coefficients that meet it. 0 asks for all.
   std::optional<double> max_error;

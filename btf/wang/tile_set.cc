@@ -86,6 +86,23 @@ absl::Status CheckTileSet(const TileSet& tile_set) {
   return CheckTiles(tile_set);
 }
 
+std::optional<SourceGrid> SourceGridOf(const TileSet& tile_set) {
+  const auto exemplar = tile_set.metadata.find("exemplar");
+  if (tile_set.source_pixels.empty() || exemplar == tile_set.metadata.end() || !exemplar->is_object()) {
+    return std::nullopt;
+  }
+  const auto read = [&exemplar](const char* key, int64_t fallback) {
+    const auto value = exemplar->find(key);
+    return value != exemplar->end() && value->is_number_integer() ? value->get<int64_t>() : fallback;
+  };
+  const int64_t width = read("width", 0);
+  const int64_t footprint = read("footprint", 1);
+  if (width < 1 || width > kMostGridWidth || footprint < 1 || footprint > kMostGridWidth) {
+    return std::nullopt;
+  }
+  return SourceGrid{.width = static_cast<int>(width), .footprint = static_cast<int>(footprint)};
+}
+
 absl::StatusOr<std::string> SerializeTileSet(const TileSet& tile_set) {
   TESSERA_RETURN_IF_ERROR(CheckTileSet(tile_set));
   Container container;

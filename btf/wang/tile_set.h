@@ -4,6 +4,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -20,8 +21,9 @@ namespace tessera {
 constexpr uint32_t PackTexel(uint32_t btfel, int turns) {
   return btfel | (static_cast<uint32_t>(turns & 3) << 30);
 }
+inline constexpr uint32_t kLargestPackedBtfel = (uint32_t{1} << 30) - 1;
 constexpr uint32_t BtfelOfTexel(uint32_t texel) {
-  return texel & 0x3fffffffu;
+  return texel & kLargestPackedBtfel;
 }
 constexpr int TurnsOfTexel(uint32_t texel) {
   return static_cast<int>(texel >> 30);
@@ -52,6 +54,19 @@ struct TileSet {
     return tile_index[(static_cast<size_t>(tile) * tile_size + y) * tile_size + x];
   }
 };
+
+// How BTFels lie in the exemplar: each is the mean over footprint x footprint pixels, of which source_pixels
+// names the first, and so far do neighbouring texels of a tile lie apart. Of a tile set the footprint is 1,
+// of what far scenes need of one more (refine/level_set.h).
+struct SourceGrid {
+  int width = 1;  // of the exemplar, pixels
+  int footprint = 1;
+};
+// Largest of either.
+inline constexpr int kMostGridWidth = 1 << 24;
+
+// As metadata.exemplar states it; nothing where it or source_pixels is missing.
+[[nodiscard]] std::optional<SourceGrid> SourceGridOf(const TileSet& tile_set);
 
 // What both of the functions below check. Errors: those of theirs that are about more than bytes.
 [[nodiscard]] absl::Status CheckTileSet(const TileSet& tile_set);

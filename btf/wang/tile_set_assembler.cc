@@ -13,9 +13,11 @@
 #include "btf/base/status_macros.h"
 #include "btf/codec/btfel_table_io.h"
 #include "btf/codec/container.h"
+#include "btf/codec/container_frame.h"
 #include "btf/codec/decoder.h"
 #include "btf/codec/quantize.h"
 #include "btf/wang/arrangement_header.h"
+#include "btf/wang/tile_set_index_io.h"
 #include "btf/wang/tile_set_layer_io.h"
 #include "btf/wang/tile_set_parts.h"
 #include "btf/wang/tile_set_parts_layout.h"
@@ -25,30 +27,16 @@ namespace {
 
 constexpr char kPartKey[] = "part";
 constexpr int kMostTexelsOfSide = 4096;
-// Transforms take time with the cube of it.
-constexpr int kMostBlockSide = 512;
 constexpr float kMostValue = 1e30F;
 constexpr int kMostParts = 1 << 20;
 constexpr int64_t kMostCoefficients = int64_t{1} << 20;
 
-bool AllFiniteValues(std::span<const float> values) {
-  return std::ranges::all_of(values, [](float value) { return std::isfinite(value); });
-}
-
-absl::StatusOr<std::vector<float>> ReadFinite(const Container& container, std::string_view name,
-                                              size_t count) {
-  TESSERA_ASSIGN_OR_RETURN(std::vector<float> values, ReadVector<float>(container, name));
-  if (values.size() != count || !AllFiniteValues(values)) {
-    return absl::InvalidArgumentError(absl::StrCat("section '", absl::string_view(name.data(), name.size()),
-                                                   "': ", values.size(), " values, expected ", count,
-                                                   " finite ones"));
-  }
-  return values;
-}
-
 // Reads the entries of a table from the section of its name.
 absl::Status ReadEntries(const Container& container, const std::string& name,
                          std::span<const int64_t> entries, CodecTable& table) {
+  if (entries.empty()) {
+    return absl::OkStatus();
+  }
   const std::array<int64_t, 1> shape = {static_cast<int64_t>(entries.size())};
   TESSERA_ASSIGN_OR_RETURN(const Section* section, RequireSection(container, name, table.dtype, shape));
   const auto scatter = [&]<typename T>(std::vector<T> values) {
@@ -108,10 +96,19 @@ absl::StatusOr<CodecTable> EmptyTable(const std::string& name, const nlohmann::j
   return refused("dtype is none of u8, u16 and f32");
 }
 
+absl::StatusOr<Container> ParsePart(std::span<const std::byte> bytes) {
+  TESSERA_ASSIGN_OR_RETURN(Container container, ParseFrame(bytes));
+  if (container.kind != kTileSetPartKind) {
+    return absl::InvalidArgumentError(
+        absl::StrCat("container kind '", container.kind, "', expected '", kTileSetPartKind, "'"));
+  }
+  return container;
+}
+
 }  // namespace
 
 absl::StatusOr<TileSetAssembler> TileSetAssembler::Begin(std::span<const std::byte> part) {
-  TESSERA_ASSIGN_OR_RETURN(const Container container, ParseContainerOfKind(part, kTileSetPartKind));
+  TESSERA_ASSIGN_OR_RETURN(const Container container, ParsePart(part));
   TESSERA_ASSIGN_OR_RETURN(const int index, ReadInteger(container.header, "part", 0, kMostParts));
   if (index != 0) {
     return absl::FailedPreconditionError(absl::StrCat("part ", index, " of a tile set, expected part 0"));
@@ -193,30 +190,26 @@ absl::Status TileSetAssembler::ReadTiles(const Container& container) {
     }
   }
   const size_t num_tiles = tiles_.empty() ? all_tiles : tiles_.size();
-  TESSERA_ASSIGN_OR_RETURN(const Section* section,
-                           RequireSection(container, "tile_index", DType::kU32,
-                                          std::array<int64_t, 3>{static_cast<int64_t>(num_tiles), -1, -1}));
-  const int64_t w = section->shape[1];
-  if (w != section->shape[2] || w < 1 || w > kMostTexelsOfSide) {
-    return absl::InvalidArgumentError(absl::StrCat("section 'tile_index': tiles of ", section->shape[2], "x",
-                                                   w, ", expected square ones of 1 to ", kMostTexelsOfSide));
-  }
-  const auto texels = static_cast<size_t>(w * w);
+  TESSERA_ASSIGN_OR_RETURN(const int w, ReadInteger(container.header, "tile_size", 1, kMostTexelsOfSide));
+  TESSERA_ASSIGN_OR_RETURN(grid_.width, ReadInteger(container.header, "exemplar_width", 1, kMostGridWidth));
+  TESSERA_ASSIGN_OR_RETURN(grid_.footprint, ReadInteger(container.header, "footprint", 1, kMostGridWidth));
+  const size_t texels = static_cast<size_t>(w) * static_cast<size_t>(w);
   if (all_tiles > kMaxExpandedBytes / sizeof(uint32_t) / texels) {
     return absl::InvalidArgumentError(absl::StrCat("section 'tile_codes': ", all_tiles, " tiles of ", w, "x",
                                                    w, " texels take more than ", kMaxExpandedBytes,
                                                    " bytes"));
   }
-  std::vector<uint32_t> index = SectionValues<uint32_t>(*section);
-  for (size_t tile = 0; tile < num_tiles; ++tile) {
-    RestoreTexels(static_cast<int>(w), std::span(index).subspan(tile * texels, texels));
-  }
+  TESSERA_ASSIGN_OR_RETURN(const std::vector<uint32_t> index,
+                           ReadIndexSections(container, num_tiles, w, grid_));
   // BTFels are numbered by their rank among the labels that occur.
   std::vector<uint32_t> labels(index.size());
   std::ranges::transform(index, labels.begin(), &BtfelOfTexel);
   std::ranges::sort(labels);
   labels.erase(std::ranges::unique(labels).begin(), labels.end());
   num_btfels_ = labels.size();
+  if (labels.empty()) {
+    return absl::InvalidArgumentError("section 'tile_codes': no tiles");
+  }
   const auto k = static_cast<size_t>(tile_set_.btfels.num_coefficients);
   if (num_btfels_ > kMaxExpandedBytes / k) {
     return absl::InvalidArgumentError(absl::StrCat(
@@ -226,7 +219,7 @@ absl::Status TileSetAssembler::ReadTiles(const Container& container) {
   for (size_t i = 0; i < labels.size(); ++i) {
     rank[labels[i]] = static_cast<uint32_t>(i);
   }
-  tile_set_.tile_size = static_cast<int>(w);
+  tile_set_.tile_size = w;
   tile_set_.tile_index.assign(all_tiles * texels, 0);
   size_t from = 0;
   ForTiles(tiles_, all_tiles, [&](size_t tile) {
@@ -237,23 +230,29 @@ absl::Status TileSetAssembler::ReadTiles(const Container& container) {
   });
   TESSERA_ASSIGN_OR_RETURN(const std::string labels_are, HeaderString(container.header, "labels"));
   if (labels_are == kPixelLabels) {
-    tile_set_.source_pixels = std::move(labels);
+    tile_set_.source_pixels = labels;
+    tile_set_.metadata["exemplar"] = {{"width", grid_.width}, {"footprint", grid_.footprint}};
   }
+  labels_ = std::move(labels);
   tile_set_.btfels.codes.assign(num_btfels_ * k, 0);
   return absl::OkStatus();
 }
 
 absl::Status TileSetAssembler::BeginLayers(const Container& container) {
-  const auto k = static_cast<size_t>(tile_set_.btfels.num_coefficients);
-  TESSERA_ASSIGN_OR_RETURN(const int side, ReadInteger(container.header, "block_side", 1, kMostBlockSide));
-  const auto block = static_cast<size_t>(side) * static_cast<size_t>(side);
-  if (num_btfels_ % block != 0) {
-    return absl::InvalidArgumentError(absl::StrCat("header: block_side ", side, ", but ", num_btfels_,
-                                                   " BTFels are not whole blocks of ", block));
+  const BtfelTable& table = tile_set_.btfels;
+  TESSERA_ASSIGN_OR_RETURN(TileSetLayers shared,
+                           ReadSharedSections(container, static_cast<size_t>(table.num_coefficients),
+                                              table.views.size(), table.lights.size()));
+  TESSERA_RETURN_IF_ERROR(CheckNew(shared.coefficients, held_));
+  if (shared.bases.has_value()) {
+    if (!held_.empty()) {
+      return absl::InvalidArgumentError("section 'core_mean': tables came as they are before");
+    }
+    TESSERA_ASSIGN_OR_RETURN(
+        cores_, CoreSum::Create(table, AngularTablesOf(table, *tables_), *std::move(shared.bases)));
   }
-  TESSERA_ASSIGN_OR_RETURN(std::vector<float> mean, ReadFinite(container, "mean", k));
-  TESSERA_ASSIGN_OR_RETURN(std::vector<float> scale, ReadFinite(container, "scale", k));
-  layers_.emplace(side, num_btfels_ / block, std::move(mean), std::move(scale));
+  layers_.emplace(BlocksOf(labels_, grid_, shared.block_side, shared.level), std::move(shared.coefficients),
+                  std::move(shared.mean), std::move(shared.scale));
   return absl::OkStatus();
 }
 
@@ -275,7 +274,7 @@ absl::Status TileSetAssembler::CheckNew(std::span<const uint32_t> coefficients,
 }
 
 absl::Status TileSetAssembler::AddPart(const Container& container) {
-  if (container.Find("layer_step") != nullptr) {
+  if (HasLayer(container)) {
     TESSERA_RETURN_IF_ERROR(AddLayer(container));
   } else {
     Quantize();
@@ -290,12 +289,17 @@ absl::StatusOr<BtfelTable> TileSetAssembler::TablesWith(std::span<const uint32_t
                                                         const Container& container) const {
   BtfelTable shared = tile_set_.btfels.WithoutCodes();
   for (auto& [name, codec_table] : shared.tables) {
-    if (tables_->IsSplit(name)) {
+    if (tables_->IsSplit(name) && !IsCored(name)) {
       TESSERA_RETURN_IF_ERROR(
           ReadEntries(container, name, tables_->EntriesOf(name, coefficients, held_), codec_table));
     }
   }
   return shared;
+}
+
+bool TileSetAssembler::IsCored(const std::string& table) const {
+  return cores_.has_value() &&
+         std::ranges::find(cores_->tables(), table, &AngularTable::name) != cores_->tables().end();
 }
 
 absl::Status TileSetAssembler::AddColumns(const Container& container) {
@@ -348,29 +352,44 @@ absl::Status TileSetAssembler::AddLayer(const Container& container) {
   if (is_first) {
     TESSERA_RETURN_IF_ERROR(BeginLayers(container));
   }
-  const absl::Status added = SumLayer(container);
+  const absl::Status added = SumLayer(container, is_first);
   if (!added.ok() && is_first) {
     layers_.reset();
+    cores_.reset();
   }
   return added;
 }
 
-absl::Status TileSetAssembler::SumLayer(const Container& container) {
-  TESSERA_ASSIGN_OR_RETURN(const TileSetLayer layer, ReadLayerSections(container, *layers_));
-  TESSERA_RETURN_IF_ERROR(CheckNew(layer.coefficients, held_));
-  TESSERA_ASSIGN_OR_RETURN(BtfelTable shared, TablesWith(layer.coefficients, container));
+absl::Status TileSetAssembler::SumLayer(const Container& container, bool is_first) {
+  TESSERA_ASSIGN_OR_RETURN(
+      const TileSetLayer layer,
+      ReadLayerSections(container, *layers_, cores_.has_value() ? cores_->num_matrices() : 0));
+  const std::vector<uint32_t> coefficients =
+      is_first ? std::vector<uint32_t>(layers_->coefficients().begin(), layers_->coefficients().end())
+               : std::vector<uint32_t>();
+  TESSERA_ASSIGN_OR_RETURN(BtfelTable shared, TablesWith(coefficients, container));
   LayerSum sum = *layers_;
   TESSERA_RETURN_IF_ERROR(sum.Add(layer));
   if (!(sum.Bound() <= kMostValue)) {
     return absl::InvalidArgumentError(
         absl::StrCat("layers: coefficients up to ", sum.Bound(), ", at most ", kMostValue));
   }
+  std::optional<CoreSum> cores = cores_;
+  if (cores.has_value() && (is_first || !layer.cores.empty())) {
+    if (!layer.cores.empty()) {
+      TESSERA_RETURN_IF_ERROR(cores->Add(layer.core_step, layer.cores));
+    }
+    cores->Write(shared.tables);
+  } else if (!layer.cores.empty()) {
+    return absl::InvalidArgumentError("section 'cores': the first layer has no bases for them");
+  }
   TESSERA_RETURN_IF_ERROR(MakeDecoder(shared).status());
   shared.codes = std::move(tile_set_.btfels.codes);
   tile_set_.btfels = std::move(shared);
   layers_ = std::move(sum);
+  cores_ = std::move(cores);
   is_stale_ = true;
-  Hold(layer.coefficients);
+  Hold(coefficients);
   return absl::OkStatus();
 }
 
@@ -420,7 +439,7 @@ void TileSetAssembler::Quantize() {
 }
 
 absl::Status TileSetAssembler::Add(std::span<const std::byte> part) {
-  TESSERA_ASSIGN_OR_RETURN(const Container container, ParseContainerOfKind(part, kTileSetPartKind));
+  TESSERA_ASSIGN_OR_RETURN(const Container container, ParsePart(part));
   TESSERA_ASSIGN_OR_RETURN(const int index, ReadInteger(container.header, "part", 0, kMostParts));
   TESSERA_ASSIGN_OR_RETURN(const std::string first, HeaderString(container.header, "first_sha256"));
   if (std::cmp_not_equal(index, num_parts_) || first != first_sha256_) {

@@ -10,12 +10,33 @@
 #include "btf/base/status_macros.h"
 #include "btf/codec/btfel_table_io.h"
 #include "btf/codec/container.h"
+#include "btf/codec/container_frame.h"
+#include "btf/wang/tile_set_index_io.h"
 #include "btf/wang/tile_set_layer_io.h"
 #include "btf/wang/tile_set_parts.h"
 #include "btf/wang/tile_set_parts_layout.h"
 
 namespace tessera {
 namespace {
+
+// What the texels of a part name.
+struct Labels {
+  std::vector<uint32_t> pixels;  // [BTFels]: of the exemplar, where these are known, else the BTFels' numbers
+  SourceGrid grid;
+  bool are_pixels = false;
+};
+
+Labels LabelsOf(const TileSet& tile_set) {
+  const std::optional<SourceGrid> grid = SourceGridOf(tile_set);
+  const std::vector<uint32_t>& pixels = tile_set.source_pixels;
+  if (grid.has_value() && pixels.size() == tile_set.btfels.size() && pixels.back() <= kLargestPackedBtfel) {
+    return {.pixels = pixels, .grid = *grid, .are_pixels = true};
+  }
+  Labels labels;
+  labels.pixels.resize(tile_set.btfels.size());
+  std::iota(labels.pixels.begin(), labels.pixels.end(), 0U);
+  return labels;
+}
 
 absl::Status CheckTiles(const TileSet& tile_set, const TileSetCut& cut) {
   if (std::ranges::adjacent_find(cut.tiles, std::greater_equal()) != cut.tiles.end() ||
@@ -53,33 +74,45 @@ absl::Status CheckColumns(const TileSetCut& cut, const CoefficientTables& tables
 }
 
 // Whether the layers can be added up.
-absl::Status CheckLayers(const TileSetCut& cut, const TileSet& tile_set, size_t k) {
+absl::Status CheckLayers(const TileSetCut& cut, const TileSet& tile_set, const CoefficientTables& tables,
+                         size_t k) {
   const TileSetLayers& layers = *cut.layers;
-  const size_t block = static_cast<size_t>(std::max(layers.block_side, 0)) *
-                       static_cast<size_t>(std::max(layers.block_side, 0));
-  if (layers.mean.size() != k || layers.scale.size() != k || layers.layers.empty() || block == 0 ||
-      tile_set.btfels.size() % block != 0) {
+  if (layers.mean.size() != k || layers.scale.size() != k || layers.layers.empty() || layers.block_side < 1 ||
+      layers.block_side > kMostBlockSide || layers.level < 0 || layers.level > kMostLevel) {
     return absl::InvalidArgumentError(absl::StrCat(
         layers.layers.size(), " layers, mean of ", layers.mean.size(), ", scale of ", layers.scale.size(),
-        ", expected ", k, ", blocks of ", block, " of ", tile_set.btfels.size(), " BTFels"));
+        ", expected ", k, ", blocks of side ", layers.block_side, ", level ", layers.level));
   }
-  for (const auto& [name, table] : layers.tables) {
-    const auto of_set = tile_set.btfels.tables.find(name);
-    if (of_set == tile_set.btfels.tables.end() || of_set->second.dtype != table.dtype ||
-        of_set->second.values.size() != table.values.size() || !cut.ends.empty()) {
-      return absl::InvalidArgumentError(
-          absl::StrCat("layers: table '", name, "' is not the tile set's, or exact coefficients follow"));
+  std::vector<bool> is_taken(k, false);
+  for (size_t i = 0; i < (cut.ends.empty() ? 0 : cut.ends[0]); ++i) {
+    is_taken[cut.order[i]] = true;
+  }
+  for (const uint32_t coefficient : layers.coefficients) {
+    if (coefficient >= k || is_taken[coefficient]) {
+      return absl::InvalidArgumentError(absl::StrCat("layers: coefficient ", coefficient, " of ", k,
+                                                     " is out of range, appears twice or is exact before"));
     }
+    is_taken[coefficient] = true;
   }
-  LayerSum sum(layers.block_side, tile_set.btfels.size() / block, layers.mean, layers.scale);
+  std::optional<CoreSum> cores;
+  if (layers.bases.has_value()) {
+    if (!cut.ends.empty()) {
+      return absl::InvalidArgumentError("layers: tables come as cores, and exact coefficients follow");
+    }
+    TESSERA_ASSIGN_OR_RETURN(
+        cores, CoreSum::Create(tile_set.btfels, AngularTablesOf(tile_set.btfels, tables), *layers.bases));
+  }
+  const Labels labels = LabelsOf(tile_set);
+  LayerSum sum(BlocksOf(labels.pixels, labels.grid, layers.block_side, layers.level), layers.coefficients,
+               layers.mean, layers.scale);
   for (const TileSetLayer& layer : layers.layers) {
-    for (size_t i = 0; i < (cut.ends.empty() ? 0 : cut.ends[0]); ++i) {
-      if (std::ranges::find(layer.coefficients, cut.order[i]) != layer.coefficients.end()) {
-        return absl::InvalidArgumentError(
-            absl::StrCat("layers: coefficient ", cut.order[i], " is exact before they come"));
-      }
-    }
     TESSERA_RETURN_IF_ERROR(sum.Add(layer));
+    if (!layer.cores.empty()) {
+      if (!cores.has_value()) {
+        return absl::InvalidArgumentError("layers: codes of cores, but no bases");
+      }
+      TESSERA_RETURN_IF_ERROR(cores->Add(layer.core_step, layer.cores));
+    }
   }
   return absl::OkStatus();
 }
@@ -100,11 +133,11 @@ Section TableSection(const std::string& name, const CodecTable& table, std::span
   };
   switch (table.dtype) {
     case DType::kU8:
-      return Compressed(gather(uint8_t{}));
+      return gather(uint8_t{});
     case DType::kU16:
-      return Compressed(gather(uint16_t{}));
+      return gather(uint16_t{});
     default:
-      return Compressed(gather(float{}));
+      return gather(float{});
   }
 }
 
@@ -137,11 +170,11 @@ absl::StatusOr<TileSetCutter> TileSetCutter::Create(const TileSet& tile_set, Til
   const auto k = static_cast<size_t>(std::max(tile_set.btfels.num_coefficients, 0));
   TESSERA_RETURN_IF_ERROR(CheckColumns(cut, tables, k));
   if (cut.layers != nullptr) {
-    TESSERA_RETURN_IF_ERROR(CheckLayers(cut, tile_set, k));
+    TESSERA_RETURN_IF_ERROR(CheckLayers(cut, tile_set, tables, k));
   }
   TileSetCutter cutter(tile_set, std::move(cut), std::move(tables));
   cutter.FindBtfels();
-  TESSERA_RETURN_IF_ERROR(cutter.FindBlocks());
+  cutter.FindBlocks();
   return cutter;
 }
 
@@ -156,7 +189,7 @@ TileSetCutter::Piece TileSetCutter::PieceOf(size_t part) const {
 
 std::vector<uint32_t> TileSetCutter::CoefficientsOf(const Piece& piece) const {
   if (piece.is_layer) {
-    return cut_.layers->layers[piece.index].coefficients;
+    return piece.index == 0 ? cut_.layers->coefficients : std::vector<uint32_t>();
   }
   const size_t begin = piece.index == 0 ? 0 : cut_.ends[piece.index - 1];
   return {cut_.order.begin() + static_cast<std::ptrdiff_t>(begin),
@@ -196,41 +229,18 @@ void TileSetCutter::FindBtfels() {
   }
 }
 
-absl::Status TileSetCutter::FindBlocks() {
+void TileSetCutter::FindBlocks() {
   if (cut_.layers == nullptr) {
-    return absl::OkStatus();
+    return;
   }
-  const auto block = static_cast<uint32_t>(cut_.layers->block_side * cut_.layers->block_side);
-  for (size_t i = 0; i < btfels_.size(); ++i) {
-    if (btfels_[i] % block != i % block) {
-      return absl::InvalidArgumentError(
-          absl::StrCat("tiles show BTFel ", btfels_[i], " without the others of its block of ", block));
-    }
-    if (i % block == 0) {
-      blocks_.push_back(btfels_[i] / block);
-    }
+  const Labels labels = LabelsOf(*tile_set_);
+  const LayerBlocks all = BlocksOf(labels.pixels, labels.grid, cut_.layers->block_side, cut_.layers->level);
+  num_blocks_ = all.size();
+  for (const uint32_t btfel : btfels_) {
+    blocks_.push_back(all.places[btfel] / static_cast<uint32_t>(all.side * all.side));
   }
-  return btfels_.size() % block == 0
-             ? absl::OkStatus()
-             : absl::InvalidArgumentError(
-                   absl::StrCat("tiles show ", btfels_.size(), " BTFels, not whole blocks of ", block));
-}
-
-bool TileSetCutter::KnowsPixels() const {
-  const std::vector<uint32_t>& pixels = tile_set_->source_pixels;
-  return pixels.size() == tile_set_->btfels.size() && !pixels.empty() && pixels.back() <= kLargestLabel;
-}
-
-std::vector<uint32_t> TileSetCutter::Labels() const {
-  if (KnowsPixels()) {
-    return tile_set_->source_pixels;
-  }
-  const size_t num_btfels = tile_set_->btfels.size();
-  std::vector<uint32_t> labels(num_btfels);
-  for (size_t i = 0; i < num_btfels; ++i) {
-    labels[i] = static_cast<uint32_t>(i);
-  }
-  return labels;
+  std::ranges::sort(blocks_);
+  blocks_.erase(std::ranges::unique(blocks_).begin(), blocks_.end());
 }
 
 absl::Status TileSetCutter::AddHead(Container& container) const {
@@ -247,31 +257,26 @@ absl::Status TileSetCutter::AddHead(Container& container) const {
                                      {"sha256", tile_set_->arrangement_sha256}};
   container.header["strip_height"] = tile_set_->strip_height;
   container.header["radiometry"] = tile_set_->radiometry;
-  container.header["labels"] = KnowsPixels() ? kPixelLabels : kBtfelLabels;
+  const Labels labels = LabelsOf(*tile_set_);
+  container.header["labels"] = labels.are_pixels ? kPixelLabels : kBtfelLabels;
+  container.header["exemplar_width"] = labels.grid.width;
+  container.header["footprint"] = labels.grid.footprint;
+  container.header["tile_size"] = tile_set_->tile_size;
   container.header["origin"] = cut_.origin;
   AddProvenance(tile_set_->provenance, container);
 
-  const auto w = static_cast<int64_t>(tile_set_->tile_size);
-  const std::vector<uint32_t> labels = Labels();
+  const auto texels = static_cast<size_t>(tile_set_->tile_size) * static_cast<size_t>(tile_set_->tile_size);
   std::vector<uint32_t> index;
   ForTiles(cut_.tiles, tile_set_->tile_codes.size(), [&](size_t tile) {
-    std::vector<uint32_t> texels(static_cast<size_t>(w * w));
-    for (size_t i = 0; i < texels.size(); ++i) {
-      const uint32_t texel = tile_set_->tile_index[tile * texels.size() + i];
-      texels[i] = PackTexel(labels[BtfelOfTexel(texel)], TurnsOfTexel(texel));
+    for (size_t i = tile * texels; i < (tile + 1) * texels; ++i) {
+      const uint32_t texel = tile_set_->tile_index[i];
+      index.push_back(PackTexel(labels.pixels[BtfelOfTexel(texel)], TurnsOfTexel(texel)));
     }
-    PredictTexels(tile_set_->tile_size, texels);
-    index.insert(index.end(), texels.begin(), texels.end());
   });
-  const auto num_tiles = static_cast<int64_t>(index.size()) / (w * w);
-  container.sections.push_back(Compressed(MakeSection<uint32_t>(
-      "tile_codes", {static_cast<int64_t>(tile_set_->tile_codes.size())}, tile_set_->tile_codes)));
-  if (!cut_.tiles.empty()) {
-    container.sections.push_back(Compressed(MakeSection<uint32_t>("tiles", {num_tiles}, cut_.tiles)));
-  }
-  container.sections.push_back(Compressed(MakeSection<uint32_t>("tile_index", {num_tiles, w, w}, index)));
-  container.sections.push_back(
-      Compressed(MakeSection<float>("fill", {table.num_coefficients}, std::span<const float>(cut_.fill))));
+  AddVector("tile_codes", tile_set_->tile_codes, container);
+  AddVector("tiles", cut_.tiles, container);
+  AddIndexSections(index, tile_set_->tile_size, labels.grid, container);
+  AddVector("fill", cut_.fill, container);
   TESSERA_RETURN_IF_ERROR(AddDirections("views", table.views, container));
   TESSERA_RETURN_IF_ERROR(AddDirections("lights", table.lights, container));
   for (const auto& [name, codec_table] : table.tables) {
@@ -285,23 +290,20 @@ absl::Status TileSetCutter::AddHead(Container& container) const {
 void TileSetCutter::AddColumns(size_t part, Container& container) const {
   const BtfelTable& table = tile_set_->btfels;
   const std::vector<uint32_t> columns = CoefficientsOf(PieceOf(part));
-  const auto count = static_cast<int64_t>(columns.size());
   std::vector<float> offset;
   std::vector<float> step;
   for (const uint32_t coefficient : columns) {
     offset.push_back(table.offset[coefficient]);
     step.push_back(table.step[coefficient]);
   }
-  container.sections.push_back(
-      Compressed(MakeSection<uint32_t>("coefficients", {count}, std::span<const uint32_t>(columns))));
-  container.sections.push_back(
-      Compressed(MakeSection<float>("offset", {count}, std::span<const float>(offset))));
-  container.sections.push_back(Compressed(MakeSection<float>("step", {count}, std::span<const float>(step))));
+  AddVector("coefficients", columns, container);
+  AddVector("offset", offset, container);
+  AddVector("step", step, container);
   AddEntries(columns, CoefficientsBefore(part), container);
   Section codes;
   codes.name = absl::StrCat("btfels.", part);
   codes.dtype = DType::kU8;
-  codes.shape = {static_cast<int64_t>(btfels_.size()), count};
+  codes.shape = {static_cast<int64_t>(btfels_.size()), static_cast<int64_t>(columns.size())};
   codes.bytes.resize(btfels_.size() * columns.size());
   char* to = codes.bytes.data();
   for (const uint32_t btfel : btfels_) {
@@ -310,18 +312,25 @@ void TileSetCutter::AddColumns(size_t part, Container& container) const {
       *to++ = static_cast<char>(from[coefficient]);
     }
   }
-  container.sections.push_back(Compressed(std::move(codes)));
+  container.sections.push_back(std::move(codes));
+}
+
+bool TileSetCutter::IsCored(const std::string& table) const {
+  if (cut_.layers == nullptr || !cut_.layers->bases.has_value()) {
+    return false;
+  }
+  const std::vector<AngularTable> angular = AngularTablesOf(tile_set_->btfels, tables_);
+  return std::ranges::find(angular, table, &AngularTable::name) != angular.end();
 }
 
 void TileSetCutter::AddEntries(std::span<const uint32_t> coefficients, std::span<const uint32_t> before,
                                Container& container) const {
   for (const auto& [name, codec_table] : tile_set_->btfels.tables) {
-    if (tables_.IsSplit(name)) {
-      const CodecTable* table = &codec_table;
-      if (cut_.layers != nullptr && cut_.layers->tables.contains(name)) {
-        table = &cut_.layers->tables.at(name);
+    if (tables_.IsSplit(name) && !IsCored(name)) {
+      const std::vector<int64_t> entries = tables_.EntriesOf(name, coefficients, before);
+      if (!entries.empty()) {
+        container.sections.push_back(TableSection(name, codec_table, entries));
       }
-      container.sections.push_back(TableSection(name, *table, tables_.EntriesOf(name, coefficients, before)));
     }
   }
 }
@@ -330,16 +339,10 @@ void TileSetCutter::AddLayer(size_t part, Container& container) const {
   const TileSetLayers& layers = *cut_.layers;
   const size_t index = PieceOf(part).index;
   if (index == 0) {
-    container.header["block_side"] = layers.block_side;
-    const auto k = static_cast<int64_t>(layers.mean.size());
-    container.sections.push_back(
-        Compressed(MakeSection<float>("mean", {k}, std::span<const float>(layers.mean))));
-    container.sections.push_back(
-        Compressed(MakeSection<float>("scale", {k}, std::span<const float>(layers.scale))));
+    AddSharedSections(layers, container);
+    AddEntries(layers.coefficients, CoefficientsBefore(part), container);
   }
-  const auto block = static_cast<size_t>(layers.block_side) * static_cast<size_t>(layers.block_side);
-  AddLayerSections(layers, index, blocks_, tile_set_->btfels.size() / block, container);
-  AddEntries(layers.layers[index].coefficients, CoefficientsBefore(part), container);
+  AddLayerSections(layers, index, blocks_, num_blocks_, container);
 }
 
 absl::StatusOr<std::string> TileSetCutter::Part(size_t index, std::string_view first_sha256) const {
@@ -357,7 +360,7 @@ absl::StatusOr<std::string> TileSetCutter::Part(size_t index, std::string_view f
   } else {
     AddColumns(index, container);
   }
-  return SerializeContainer(std::move(container));
+  return FrameContainer(std::move(container));
 }
 
 }  // namespace tessera

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <tuple>
 #include <utility>
 
@@ -31,8 +32,40 @@ std::vector<BlockFrequency> BlockFrequencies(int block_side) {
   return frequencies;
 }
 
-float StepFactor(const BlockFrequency& frequency, int block_side) {
-  return 2 * std::max(frequency.u, frequency.v) >= block_side && block_side > 1 ? 2.0F : 1.0F;
+std::vector<float> LayerBlocks::StepFactors() const {
+  // Of the mean of BTFels side by side, `pixels` of the exemplar wide.
+  const auto mean = [&](int half_periods, double pixels) {
+    const double angle = kPi * half_periods / (2.0 * side);
+    const double single = std::sin(angle * footprint);
+    return half_periods == 0 || single == 0.0
+               ? 1.0
+               : std::abs(std::sin(angle * pixels) * footprint / (pixels * single));
+  };
+  const auto level_pixels = static_cast<double>(uint64_t{1} << level);
+  std::vector<float> factors;
+  for (const auto& [u, v] : BlockFrequencies(side)) {
+    const double seen = 0.5 * (mean(u, level_pixels) * mean(v, level_pixels) +
+                               mean(u, 2.0 * level_pixels) * mean(v, 2.0 * level_pixels));
+    factors.push_back(static_cast<float>(footprint / std::clamp(seen, kLeastSeen, 1.0)));
+  }
+  return factors;
+}
+
+LayerBlocks BlocksOf(std::span<const uint32_t> pixels, const SourceGrid& grid, int side, int level) {
+  LayerBlocks blocks{.side = side, .footprint = grid.footprint, .level = level};
+  const auto width = static_cast<uint32_t>(grid.width);
+  const auto s = static_cast<uint32_t>(side);
+  const uint32_t across = (width + s - 1) / s;
+  const auto number = [&](uint32_t pixel) { return pixel / width / s * across + pixel % width / s; };
+  std::ranges::transform(pixels, std::back_inserter(blocks.numbers), number);
+  std::ranges::sort(blocks.numbers);
+  blocks.numbers.erase(std::ranges::unique(blocks.numbers).begin(), blocks.numbers.end());
+  for (const uint32_t pixel : pixels) {
+    const auto block = static_cast<uint32_t>(std::ranges::lower_bound(blocks.numbers, number(pixel)) -
+                                             blocks.numbers.begin());
+    blocks.places.push_back((block * s + pixel / width % s) * s + pixel % width % s);
+  }
+  return blocks;
 }
 
 BlockCosines::BlockCosines(int block_side) : side_(block_side), frequencies_(BlockFrequencies(block_side)) {
@@ -79,80 +112,57 @@ std::vector<float> BlockCosines::Back(std::span<const float> cosines) const {
   return image;
 }
 
-LayerSum::LayerSum(int block_side, size_t num_blocks, std::vector<float> mean, std::vector<float> scale)
-    : block_side_(block_side),
-      num_blocks_(num_blocks),
+LayerSum::LayerSum(LayerBlocks blocks, std::vector<uint32_t> coefficients, std::vector<float> mean,
+                   std::vector<float> scale)
+    : blocks_(std::move(blocks)),
+      coefficients_(std::move(coefficients)),
       mean_(std::move(mean)),
       scale_(std::move(scale)),
-      frequencies_(BlockFrequencies(block_side)),
-      transform_(block_side) {}
+      factors_(blocks_.StepFactors()),
+      transform_(blocks_.side) {}
 
 absl::Status LayerSum::Check(const TileSetLayer& layer) const {
   if (!std::isfinite(layer.step) || layer.step <= 0.0F) {
     return absl::InvalidArgumentError(absl::StrCat("layer's step ", layer.step, ", expected above 0"));
   }
-  std::vector<bool> taken(mean_.size(), false);
-  for (const std::vector<uint32_t>& held : coefficients_) {
-    for (const uint32_t coefficient : held) {
-      taken[coefficient] = true;
-    }
-  }
-  for (const uint32_t coefficient : layer.coefficients) {
-    if (coefficient >= taken.size() || taken[coefficient]) {
-      return absl::InvalidArgumentError(absl::StrCat("layer's coefficients: ", coefficient, " of ",
-                                                     taken.size(), " is out of range or came before"));
-    }
-    taken[coefficient] = true;
-  }
-  const size_t components = spans_.size() + layer.spans.size();
-  if (components > kMostLayerComponents ||
-      components > kMostLayerValues / std::max<size_t>(num_btfels(), 1)) {
-    return absl::InvalidArgumentError(absl::StrCat("layer's components: ", components, " in all of ",
-                                                   num_btfels(), " BTFels, at most ", kMostLayerComponents,
-                                                   ", and ", kMostLayerValues, " values"));
-  }
-  size_t basis = 0;
-  for (const uint32_t span : layer.spans) {
-    if (span > coefficients_.size()) {
-      return absl::InvalidArgumentError(
-          absl::StrCat("layer's spans: layer ", span, ", expected at most ", coefficients_.size()));
-    }
-    basis += span == coefficients_.size() ? layer.coefficients.size() : coefficients_[span].size();
+  const size_t components = basis_.size() + layer.basis_step.size();
+  const size_t pixels = blocks_.num_pixels();
+  if (components > kMostLayerComponents || components > kMostLayerValues / std::max<size_t>(pixels, 1)) {
+    return absl::InvalidArgumentError(absl::StrCat("layer's components: ", components, " in all of ", pixels,
+                                                   " pixels, at most ", kMostLayerComponents, ", and ",
+                                                   kMostLayerValues, " values"));
   }
   const auto is_step = [](float step) { return std::isfinite(step) && step >= 0.0F; };
-  if (layer.basis_step.size() != layer.spans.size() || !std::ranges::all_of(layer.basis_step, is_step)) {
-    return absl::InvalidArgumentError(absl::StrCat("layer's basis_step: ", layer.basis_step.size(),
-                                                   " values, expected ", layer.spans.size(),
-                                                   " finite ones from 0"));
+  if (!std::ranges::all_of(layer.basis_step, is_step)) {
+    return absl::InvalidArgumentError("layer's basis_step: expected finite steps from 0");
   }
-  if (layer.basis.size() != basis || layer.codes.size() != components * num_btfels()) {
+  const size_t basis = layer.basis_step.size() * coefficients_.size();
+  if (layer.basis.size() != basis || layer.codes.size() != components * pixels) {
     return absl::InvalidArgumentError(absl::StrCat("layer's basis: ", layer.basis.size(), " of ", basis,
                                                    " codes, images: ", layer.codes.size(), " of ",
-                                                   components * num_btfels()));
+                                                   components * pixels));
   }
   return absl::OkStatus();
 }
 
 absl::Status LayerSum::Add(const TileSetLayer& layer) {
   TESSERA_RETURN_IF_ERROR(Check(layer));
-  coefficients_.push_back(layer.coefficients);
   auto code = layer.basis.begin();
-  for (size_t i = 0; i < layer.spans.size(); ++i) {
+  for (const float step : layer.basis_step) {
     std::vector<float> basis;
-    for (const uint32_t coefficient : coefficients_[layer.spans[i]]) {
-      basis.push_back(scale_[coefficient] * layer.basis_step[i] * static_cast<float>(*code++));
+    for (const uint32_t coefficient : coefficients_) {
+      basis.push_back(scale_[coefficient] * step * static_cast<float>(*code++));
     }
-    spans_.push_back(layer.spans[i]);
     basis_.push_back(std::move(basis));
-    cosines_.emplace_back(num_btfels(), 0.0F);
-    images_.emplace_back(num_btfels(), 0.0F);
+    cosines_.emplace_back(blocks_.num_pixels(), 0.0F);
+    images_.emplace_back(blocks_.num_pixels(), 0.0F);
   }
   auto from = layer.codes.begin();
-  for (size_t c = 0; c < spans_.size(); ++c) {
-    for (size_t f = 0; f < frequencies_.size(); ++f) {
-      const float step = layer.step * StepFactor(frequencies_[f], block_side_);
-      for (size_t block = 0; block < num_blocks_; ++block) {
-        cosines_[c][f * num_blocks_ + block] += step * static_cast<float>(*from++);
+  for (size_t c = 0; c < basis_.size(); ++c) {
+    for (size_t f = 0; f < factors_.size(); ++f) {
+      const float step = layer.step * factors_[f];
+      for (size_t block = 0; block < blocks_.size(); ++block) {
+        cosines_[c][f * blocks_.size() + block] += step * static_cast<float>(*from++);
       }
     }
     images_[c] = transform_.Back(cosines_[c]);
@@ -172,28 +182,28 @@ float LayerSum::Bound() const {
     return most;
   };
   float bound = largest(mean_);
-  for (size_t c = 0; c < spans_.size(); ++c) {
+  for (size_t c = 0; c < basis_.size(); ++c) {
     bound += largest(images_[c]) * largest(basis_[c]);
   }
   return bound;
 }
 
-std::vector<float> LayerSum::Coefficients(std::span<const uint32_t> btfels) const {
-  const auto rows = static_cast<Eigen::Index>(btfels.size());
+std::vector<float> LayerSum::Coefficients(std::span<const uint32_t> btfels, size_t per_row) const {
+  const auto rows = static_cast<Eigen::Index>(btfels.size() / per_row);
   const auto k = static_cast<Eigen::Index>(mean_.size());
-  Rows images(rows, static_cast<Eigen::Index>(spans_.size()));
+  Rows images = Rows::Zero(rows, static_cast<Eigen::Index>(basis_.size()));
   Rows basis = Rows::Zero(images.cols(), k);
-  for (size_t c = 0; c < spans_.size(); ++c) {
+  for (size_t c = 0; c < basis_.size(); ++c) {
     const auto component = static_cast<Eigen::Index>(c);
     for (size_t i = 0; i < btfels.size(); ++i) {
-      images(static_cast<Eigen::Index>(i), component) = images_[c][btfels[i]];
+      images(static_cast<Eigen::Index>(i / per_row), component) += images_[c][blocks_.places[btfels[i]]];
     }
-    const std::vector<uint32_t>& columns = coefficients_[spans_[c]];
-    for (size_t i = 0; i < columns.size(); ++i) {
-      basis(component, columns[i]) = basis_[c][i];
+    for (size_t i = 0; i < coefficients_.size(); ++i) {
+      basis(component, coefficients_[i]) = basis_[c][i];
     }
   }
-  std::vector<float> values(btfels.size() * mean_.size());
+  images /= static_cast<float>(per_row);
+  std::vector<float> values(static_cast<size_t>(rows) * mean_.size());
   Eigen::Map<Rows> map(values.data(), rows, k);
   map = Eigen::Map<const Eigen::RowVectorXf>(mean_.data(), k).replicate(rows, 1);
   map.noalias() += images * basis;

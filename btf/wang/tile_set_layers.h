@@ -1,54 +1,55 @@
 // Coefficients of a tile set as a few images, cosine-transformed by block and quantised in layers: what most
-// scenes receive of it (refine/set_layers.h makes it, FORMAT.md describes it). A block is s x s BTFels that
-// follow each other: of a mip level, whose texels are BTFels of their own, a tile; of other sets one BTFel.
+// scenes receive of it (refine/set_layers.h makes it, FORMAT.md describes it). An image has a value at each
+// pixel of the exemplar; a block is s x s pixels of it, and only blocks that have BTFels are here.
 //
-// A coefficient is mean[j] + scale[j] * sum over components c of its layer of basis[c][j] * image[c](BTFel):
-// one layer brought it, and components are made of the coefficients of one layer. Each layer brings
-// components, and makes the images of all that came before finer.
+// A coefficient is mean[j] + scale[j] * sum over components c of basis[c][j] * image[c](BTFel). Each layer
+// brings components, and makes the images of all that came before finer, and cores of the codec's tables
+// (table_cores.h).
 //
-//   LayerSum sum(block_side, num_blocks, mean, scale);
+//   LayerSum sum(BlocksOf(source_pixels, grid, block_side, level), coefficients, mean, scale);
 //   TESSERA_RETURN_IF_ERROR(sum.Add(layer));       // again and again
 //   std::vector<float> values = sum.Coefficients(btfels);   // [btfels][k]
 #pragma once
 
 #include <cstddef>
 #include <cstdint>
-#include <map>
+#include <optional>
 #include <span>
-#include <string>
 #include <vector>
 
 #include <absl/status/status.h>
 
-#include "btf/codec/btfel_table.h"
+#include "btf/wang/table_cores.h"
+#include "btf/wang/tile_set.h"
 
 namespace tessera {
 
 inline constexpr size_t kMostLayerComponents = 256;
-// Components times BTFels: each takes a few numbers in memory.
+// Components times pixels of blocks: each takes a few numbers in memory.
 inline constexpr size_t kMostLayerValues = size_t{1} << 26;
 
 struct TileSetLayer {
-  // Of the images' cosine coefficients; twice as long for those of the upper half of the frequencies across
-  // or down.
-  float step = 0.0F;                   // > 0
-  std::vector<uint32_t> coefficients;  // that it brings
+  // Of the images' cosine coefficients, times StepFactors.
+  float step = 0.0F;  // > 0
   // Of each component that it brings:
-  std::vector<uint32_t> spans;    // the layer whose coefficients it is made of, this or one before
   std::vector<float> basis_step;  // >= 0; basis = basis_step * code
-  std::vector<int32_t> basis;     // one component after the other, [coefficients of its layer] codes
+  std::vector<int32_t> basis;     // one component after the other, [coefficients] codes
   // Of all components so far, what is added to them: [component][frequency][block] codes, frequencies in
   // BlockFrequencies's order.
   std::vector<int32_t> codes;
+  // What is added to the cores: [position][matrix] codes, up to the last that is not 0.
+  float core_step = 0.0F;  // > 0 where there are codes
+  std::vector<int32_t> cores;
 };
 
 struct TileSetLayers {
-  int block_side = 1;        // s
-  std::vector<float> mean;   // [k], of coefficients that no layer has brought
-  std::vector<float> scale;  // [k]
+  int block_side = 1;                  // s
+  int level = 0;                       // LayerBlocks's
+  std::vector<uint32_t> coefficients;  // that layers make, each once
+  std::vector<float> mean;             // [k]
+  std::vector<float> scale;            // [k]
+  std::optional<CoreBases> bases;      // of AngularTablesOf the tile set, which come as cores, if any do
   std::vector<TileSetLayer> layers;
-  // In place of the tile set's of these names: entries that belong to single coefficients, rounded.
-  std::map<std::string, CodecTable> tables;
 };
 
 // One cosine: u half periods across the block, v down.
@@ -58,9 +59,26 @@ struct BlockFrequency {
 };
 // [s * s], by rising u + v, then by rising v.
 [[nodiscard]] std::vector<BlockFrequency> BlockFrequencies(int block_side);
-// What a layer's step is multiplied by: 2 in the upper half, which the next level does not have, else 1. A
-// level is seen blended with the next one, by one half in the mean.
-[[nodiscard]] float StepFactor(const BlockFrequency& frequency, int block_side);
+
+// The blocks of an exemplar that some BTFels lie in.
+struct LayerBlocks {
+  int side = 1;
+  int footprint = 1;              // SourceGrid's
+  int level = 0;                  // the finest mip level that is seen
+  std::vector<uint32_t> numbers;  // of the blocks that are here, ascending: left to right, then down
+  std::vector<uint32_t> places;   // [BTFels], pixel of the blocks that are here, (block * s + y) * s + x
+
+  [[nodiscard]] size_t size() const { return numbers.size(); }
+  [[nodiscard]] size_t num_pixels() const { return numbers.size() * side * side; }
+  // What a layer's step is multiplied by for each of BlockFrequencies: the footprint, since frequencies above
+  // the BTFels' own have nothing to say, over what is seen of the frequency (at least kLeastSeen): texels of
+  // the level are means of BTFels, and are seen blended with the next level's, by one half in the mean.
+  [[nodiscard]] std::vector<float> StepFactors() const;
+};
+inline constexpr double kLeastSeen = 0.125;
+// Of BTFels at these pixels, y * width + x.
+[[nodiscard]] LayerBlocks BlocksOf(std::span<const uint32_t> pixels, const SourceGrid& grid, int side,
+                                   int level);
 
 // Orthonormal DCT-II of the blocks of an image, [block][y][x] to [frequency][block], and back. Of blocks of
 // one, the same image.
@@ -79,15 +97,13 @@ class BlockCosines {
 // Layers, added up. Not thread-safe.
 class LayerSum {
  public:
-  // `mean` and `scale` are [k], finite.
-  LayerSum(int block_side, size_t num_blocks, std::vector<float> mean, std::vector<float> scale);
+  // `mean` and `scale` are [k], finite; coefficients are below k.
+  LayerSum(LayerBlocks blocks, std::vector<uint32_t> coefficients, std::vector<float> mean,
+           std::vector<float> scale);
 
-  [[nodiscard]] size_t num_layers() const { return coefficients_.size(); }
-  [[nodiscard]] size_t num_components() const { return spans_.size(); }
-  [[nodiscard]] size_t num_blocks() const { return num_blocks_; }
-  [[nodiscard]] size_t num_btfels() const { return num_blocks_ * frequencies_.size(); }
-  // Those that a layer brought.
-  [[nodiscard]] std::span<const uint32_t> coefficients(size_t layer) const { return coefficients_[layer]; }
+  [[nodiscard]] size_t num_components() const { return basis_.size(); }
+  [[nodiscard]] const LayerBlocks& blocks() const { return blocks_; }
+  [[nodiscard]] std::span<const uint32_t> coefficients() const { return coefficients_; }
   // Of a component, [frequency][block].
   [[nodiscard]] std::span<const float> cosines(size_t component) const { return cosines_[component]; }
 
@@ -96,23 +112,21 @@ class LayerSum {
   [[nodiscard]] absl::Status Add(const TileSetLayer& layer);
   // No coefficient is larger than this.
   [[nodiscard]] float Bound() const;
-  // [btfels][k]. Finite where Bound() is.
-  [[nodiscard]] std::vector<float> Coefficients(std::span<const uint32_t> btfels) const;
+  // [rows][k], of the means of so many BTFels that follow each other. Finite where Bound() is.
+  [[nodiscard]] std::vector<float> Coefficients(std::span<const uint32_t> btfels, size_t per_row = 1) const;
 
  private:
   [[nodiscard]] absl::Status Check(const TileSetLayer& layer) const;
 
-  int block_side_;
-  size_t num_blocks_;
+  LayerBlocks blocks_;
+  std::vector<uint32_t> coefficients_;
   std::vector<float> mean_;
   std::vector<float> scale_;
-  std::vector<BlockFrequency> frequencies_;
+  std::vector<float> factors_;  // [frequency]
   BlockCosines transform_;
-  std::vector<std::vector<uint32_t>> coefficients_;  // [layer]
-  std::vector<uint32_t> spans_;                      // [component]
-  std::vector<std::vector<float>> basis_;            // [component][coefficients of its layer], scaled
-  std::vector<std::vector<float>> cosines_;          // [component][frequency][block]
-  std::vector<std::vector<float>> images_;           // [component][block][y][x]
+  std::vector<std::vector<float>> basis_;    // [component][coefficients], scaled
+  std::vector<std::vector<float>> cosines_;  // [component][frequency][block]
+  std::vector<std::vector<float>> images_;   // [component][block][y][x]
 };
 
 }  // namespace tessera

@@ -1,5 +1,5 @@
 // A tile set cut into parts that arrive one after the other: the first can be drawn, each further one brings
-// more coefficients. A part is a container of kind "tile_set_part" (codec/FORMAT.md).
+// more coefficients. A part is a container of kind "tile_set_part" (codec/FORMAT.md), framed.
 //
 //   TESSERA_ASSIGN_OR_RETURN(auto cutter, TileSetCutter::Create(tile_set, cut));
 //   TESSERA_ASSIGN_OR_RETURN(std::string first, cutter.Part(0, ""));
@@ -40,7 +40,7 @@ struct TileSetCut {
   std::vector<uint32_t> order;  // [k], a permutation of the coefficients; of layers alone empty
   std::vector<uint32_t> ends;   // prefix i adds order[ends[i - 1]] .. order[ends[i] - 1]; ascending up to k
   std::vector<float> fill;      // [k], finite; 0 where CoefficientTables::NeedsEntries
-  // May be null. Tiles hold whole blocks. Of coefficients that the first prefix brings nothing.
+  // May be null. Of coefficients that the first prefix brings nothing.
   std::shared_ptr<const TileSetLayers> layers;
   // What the parts were cut from: `tile_set_sha256`, `level`, ..; recorded in the assembled set.
   nlohmann::json origin = nlohmann::json::object();
@@ -58,7 +58,7 @@ class TileSetCutter {
   // Of the tiles.
   [[nodiscard]] size_t num_btfels() const { return btfels_.size(); }
   // The bytes of a part below num_parts(). All but the first name the first, by its SHA-256. Same arguments,
-  // same bytes. Errors: those of SerializeContainer.
+  // same bytes. Errors: those of FrameContainer.
   [[nodiscard]] absl::StatusOr<std::string> Part(size_t index, std::string_view first_sha256) const;
 
  private:
@@ -72,18 +72,17 @@ class TileSetCutter {
   };
 
   void FindBtfels();
-  // Errors: INVALID_ARGUMENT where the tiles' BTFels are not whole blocks.
-  [[nodiscard]] absl::Status FindBlocks();
+  void FindBlocks();
   [[nodiscard]] size_t num_layers() const { return cut_.layers == nullptr ? 0 : cut_.layers->layers.size(); }
   [[nodiscard]] Piece PieceOf(size_t part) const;
   [[nodiscard]] std::vector<uint32_t> CoefficientsOf(const Piece& piece) const;
   // That the parts before it bring, each once.
   [[nodiscard]] std::vector<uint32_t> CoefficientsBefore(size_t part) const;
-  [[nodiscard]] bool KnowsPixels() const;
-  [[nodiscard]] std::vector<uint32_t> Labels() const;
   [[nodiscard]] absl::Status AddHead(Container& container) const;
   void AddColumns(size_t part, Container& container) const;
   void AddLayer(size_t part, Container& container) const;
+  // Whether a table comes as cores.
+  [[nodiscard]] bool IsCored(const std::string& table) const;
   // Entries of tables that belong to these coefficients and to none of those before.
   void AddEntries(std::span<const uint32_t> coefficients, std::span<const uint32_t> before,
                   Container& container) const;
@@ -92,7 +91,8 @@ class TileSetCutter {
   TileSetCut cut_;
   CoefficientTables tables_;
   std::vector<uint32_t> btfels_;  // those that the tiles reference, ascending
-  std::vector<uint32_t> blocks_;  // theirs, where there are layers
+  std::vector<uint32_t> blocks_;  // where there are layers, those of num_blocks_ that these lie in
+  size_t num_blocks_ = 0;
 };
 
 // A tile set as it grows. After an error of Add it is what it was before. Not thread-safe.
@@ -138,13 +138,15 @@ class TileSetAssembler {
   [[nodiscard]] absl::Status AddPart(const Container& container);
   [[nodiscard]] absl::Status AddColumns(const Container& container);
   [[nodiscard]] absl::Status AddLayer(const Container& container);
-  [[nodiscard]] absl::Status SumLayer(const Container& container);
+  [[nodiscard]] absl::Status SumLayer(const Container& container, bool is_first);
   void Hold(std::span<const uint32_t> coefficients);
   // All BTFels become what the layers say, but for exact coefficients.
   void Quantize();
   // The shared tables with the entries that these coefficients need; no codes.
   [[nodiscard]] absl::StatusOr<BtfelTable> TablesWith(std::span<const uint32_t> coefficients,
                                                       const Container& container) const;
+  // Whether the table comes as cores.
+  [[nodiscard]] bool IsCored(const std::string& table) const;
   void Record();
 
   TileSet tile_set_;
@@ -156,7 +158,10 @@ class TileSetAssembler {
   std::vector<bool> is_held_;       // [k]
   std::vector<uint32_t> exact_;     // of these, those that no layer makes
   std::optional<LayerSum> layers_;  // once the first has come
+  std::optional<CoreSum> cores_;    // where tables come as cores
   bool is_stale_ = false;           // they are not in the tile set yet
+  SourceGrid grid_;
+  std::vector<uint32_t> labels_;  // [BTFels]
   size_t num_btfels_ = 0;
   size_t num_parts_ = 0;
   size_t parts_ = 0;  // that there are

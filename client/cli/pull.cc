@@ -139,7 +139,7 @@ void AddPull(CLI::App& noun, Session& session) {
   command->add_option("--for-dressing", flags->dressing,
                       "Only the tiles that this dressing shows: file of `mesh dress`");
   CLI::Option* level = command->add_option(
-      "--level", flags->level, "Only this mip level, 0 the tile set itself: tiles of half the texels each");
+      "--level", flags->level, "Only what this mip level and those above it show, 0 the tile set itself");
   command
       ->add_option("--pixels-per-quad", flags->pixels_per_quad,
                    "Only the coarsest mip level from which quads so many pixels wide look as from all")

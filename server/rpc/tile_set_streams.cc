@@ -116,11 +116,8 @@ absl::StatusOr<std::shared_ptr<const TileSetStreams::Source>> TileSetStreams::Fi
     }
   }
   const TileSet& tile_set = *source->tile_set;
-  TESSERA_ASSIGN_OR_RETURN(
-      source->refinement,
-      MakeRefinement(tile_set.btfels,
-                     {.level_tile_size = needs.level == 0 ? 0 : tile_set.tile_size, .light = needs.light},
-                     context));
+  TESSERA_ASSIGN_OR_RETURN(source->refinement,
+                           MakeRefinement(tile_set, {.level = needs.level, .light = needs.light}, context));
   sources_.push_front(source);
   return source;
 }

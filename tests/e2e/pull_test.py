@@ -56,7 +56,7 @@ class PullTest(harness.CommandTest):
 
     def test_far_scenes_move_a_level(self):
         far = self.pull("--pixels-per-quad", 2, "--for-dressing", "torus.tsra", "--max-error", 0.01)
-        self.assertEqual((far["level"], far["tile_size"]), (2, 4))
+        self.assertEqual((far["level"], far["tile_size"]), (2, 8))
         self.run_ok("mesh", "redress", "torus.tsra", "--tileset", "part.tsra")
         self.assertLess(far["part_bytes"], self.pull("--for-dressing", "torus.tsra")["part_bytes"] / 2)
 

@@ -1,5 +1,7 @@
 #include "btf/codec/container.h"
 
+#include "btf/codec/container_frame.h"
+
 #include <algorithm>
 #include <cstring>
 #include <string>
@@ -283,6 +285,37 @@ TEST(ContainerTest, RefusesToWriteWhatItWouldNotRead) {
   container = Example();
   container.header["source"] = "\xff";
   EXPECT_EQ(SerializeContainer(container).status().code(), absl::StatusCode::kInvalidArgument);
+}
+
+TEST(ContainerFrameTest, ComesBackSmallerAndDamageIsAnError) {
+  Container container;
+  container.kind = "test";
+  for (int i = 0; i < 40; ++i) {
+    const std::vector<float> values = {static_cast<float>(i)};
+    container.sections.push_back(MakeSection<float>("section_" + std::to_string(i), {1}, std::span(values)));
+  }
+  const std::string plain = *SerializeContainer(container);
+  const auto frame = FrameContainer(container);
+  ASSERT_TRUE(frame.ok()) << frame.status();
+  EXPECT_LT(frame->size(), plain.size() / 4);
+  for (const std::string& bytes : {plain, *frame}) {
+    const auto parsed = ParseFrame(std::as_bytes(std::span(bytes)));
+    ASSERT_TRUE(parsed.ok()) << parsed.status();
+    EXPECT_EQ(SectionValues<float>(*parsed->Find("section_17")), std::vector<float>{17.0F});
+  }
+  for (size_t size = 0; size < frame->size(); ++size) {
+    EXPECT_FALSE(ParseFrame(std::as_bytes(std::span(*frame).first(size))).ok()) << size;
+  }
+  for (size_t i = 0; i < frame->size(); ++i) {
+    std::string damaged = *frame;
+    damaged[i] = static_cast<char>(damaged[i] ^ 0x10);
+    (void)ParseFrame(std::as_bytes(std::span(damaged)));  // an error, or what it says
+  }
+  // A frame that claims 1 TiB.
+  const std::string bomb = {'\x28', '\xb5', '\x2f', '\xfd', '\xe0', 0, 0, 0, 0, 0, 1, 0, 0, 1, 0, 0};
+  const auto refused = ParseFrame(std::as_bytes(std::span(bomb)));
+  EXPECT_TRUE(absl::IsDataLoss(refused.status()));
+  EXPECT_THAT(refused.status().message(), HasSubstr("expand to 1099511627776"));
 }
 
 TEST(ContainerTest, KeepsEmptySections) {

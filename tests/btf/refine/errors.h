@@ -1,11 +1,13 @@
 // Small tile sets of every codec, and how far two of them are apart.
 #pragma once
 
+#include <array>
 #include <cmath>
 #include <functional>
 #include <span>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include <gtest/gtest.h>
 
@@ -34,20 +36,71 @@ inline TileSet TileSetOf(const std::string& codec, int tile_size) {
   return testing::RandomTileSet(std::move(material->btfels), tile_size, 5);
 }
 
-// Over all texels of the table and all measured directions, by another way than the plan's.
-inline double RmseBetween(const TileSet& a, const TileSet& b) {
+// Of patches, as tiles are: each quarter of a tile shows a square of an exemplar of 12x12 texels, turned.
+inline TileSet PatchTileSetOf(const std::string& codec, int tile_size) {
+  constexpr int kWidth = 12;
+  SampledBtf btf = ShinyBtf(kWidth, kWidth, RingDirections(3, 6), RingDirections(3, 7));
+  auto material =
+      Encode(codec, btf, {.kl = 16, .kv = 9, .eigen_textures = 3, .rank = codec == "dfmf" ? 16 : 0});
+  EXPECT_TRUE(material.ok()) << material.status();
+  TileSet tile_set = testing::RandomTileSet(std::move(material->btfels), tile_size, 5);
+  tile_set.metadata["exemplar"] = {{"width", kWidth}};
+  for (uint32_t pixel = 0; pixel < kWidth * kWidth; ++pixel) {
+    tile_set.source_pixels.push_back(pixel);
+  }
+  Rng rng(6);
+  const int half = tile_size / 2;
+  for (size_t tile = 0; tile < tile_set.tile_codes.size(); ++tile) {
+    for (int quarter = 0; quarter < 4; ++quarter) {
+      const auto left = static_cast<int>(rng.NextBelow(kWidth - half + 1));
+      const auto top = static_cast<int>(rng.NextBelow(kWidth - half + 1));
+      const auto turns = static_cast<int>(rng.NextBelow(4));
+      for (int i = 0; i < half * half; ++i) {
+        const int x = i % half;
+        const int y = i / half;
+        const int last = half - 1;
+        const std::array<std::pair<int, int>, 4> turned = {
+            {{x, y}, {last - y, x}, {last - x, last - y}, {y, last - x}}};
+        const auto [source_x, source_y] = turned[static_cast<size_t>(turns)];
+        const size_t at = (tile * tile_size + quarter / 2 * half + y) * tile_size + quarter % 2 * half + x;
+        tile_set.tile_index[at] =
+            PackTexel(static_cast<uint32_t>((top + source_y) * kWidth + left + source_x), turns);
+      }
+    }
+  }
+  return tile_set;
+}
+
+// Over texels spread over the tiles and all measured directions, by another way than the plan's: of means of
+// squares of side x side texels, each in its own frame.
+inline double RmseBetween(const TileSet& a, const TileSet& b, int side = 1) {
   const auto decoder_a = *MakeDecoder(a.btfels);
   const auto decoder_b = *MakeDecoder(b.btfels);
   double squares = 0.0;
   size_t count = 0;
   for (const Direction& view : a.btfels.views) {
     for (const Direction& light : a.btfels.lights) {
-      for (size_t i = 0; i < a.tile_index.size(); i += 37) {
-        const auto value = [&](const TileSet& set, const Decoder& decoder) {
-          return decoder.Decode(set.btfels.btfel(BtfelOfTexel(set.tile_index[i])), VectorFromDirection(light),
-                                VectorFromDirection(view), 0);
+      const LinearForm form_a = decoder_a->Form(VectorFromDirection(light), VectorFromDirection(view));
+      const LinearForm form_b = decoder_b->Form(VectorFromDirection(light), VectorFromDirection(view));
+      const int across = a.tile_size / side;
+      const size_t squares_in_all = a.tile_codes.size() * across * across;
+      for (size_t i = 0; i < squares_in_all; i += 37) {
+        const auto value = [&](const TileSet& set, const LinearForm& form) {
+          Eigen::Array3d sum = Eigen::Array3d::Zero();
+          for (int j = 0; j < side * side; ++j) {
+            const int tile = static_cast<int>(i) / (across * across);
+            const int x = static_cast<int>(i) % across * side + j % side;
+            const int y = static_cast<int>(i) / across % across * side + j / side;
+            std::vector<double> values;
+            const auto codes = set.btfels.btfel(BtfelOfTexel(set.texel(tile, x, y)));
+            for (size_t c = 0; c < codes.size(); ++c) {
+              values.push_back(set.btfels.offset[c] + static_cast<double>(set.btfels.step[c]) * codes[c]);
+            }
+            sum += form.ValueOf(values);
+          }
+          return (sum / (side * side)).max(0.0).eval();
         };
-        squares += (value(a, *decoder_a) - value(b, *decoder_b)).square().sum();
+        squares += (value(a, form_a) - value(b, form_b)).square().sum();
         count += 3;
       }
     }

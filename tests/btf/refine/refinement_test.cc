@@ -25,7 +25,7 @@ INSTANTIATE_TEST_SUITE_P(AllCodecs, CodecRefinementTest, ::testing::ValuesIn(All
 
 TEST_P(CodecRefinementTest, EveryPrefixIsAValidSetAndErrorsFallToNothing) {
   const TileSet tile_set = TileSetOf(GetParam(), 4);
-  const auto refinement = MakeRefinement(tile_set.btfels, {}, {});
+  const auto refinement = MakeRefinement(tile_set, {}, {});
   ASSERT_TRUE(refinement.ok()) << refinement.status();
   ASSERT_GE(refinement->rmse.size(), 3u);
   EXPECT_EQ(TileSetCutter::Create(tile_set, refinement->cut)->num_parts(), refinement->rmse.size());
@@ -54,7 +54,7 @@ TEST_P(CodecRefinementTest, EveryPrefixIsAValidSetAndErrorsFallToNothing) {
 
 TEST_P(CodecRefinementTest, AllPartsTogetherAreTheTileSet) {
   const TileSet tile_set = TileSetOf(GetParam(), 4);
-  const auto refinement = MakeRefinement(tile_set.btfels, {}, {});
+  const auto refinement = MakeRefinement(tile_set, {}, {});
   ASSERT_TRUE(refinement.ok()) << refinement.status();
   ForPrefixes(tile_set, refinement->cut, [&](size_t, TileSetAssembler& assembler) {
     if (assembler.is_complete()) {
@@ -71,23 +71,22 @@ TEST_P(CodecRefinementTest, AllPartsTogetherAreTheTileSet) {
 
 TEST_P(CodecRefinementTest, EnvironmentsHaveAnOrderOfTheirOwn) {
   const TileSet tile_set = TileSetOf(GetParam(), 4);
-  const auto point = MakeRefinement(tile_set.btfels, {}, {});
-  const auto sky = MakeRefinement(tile_set.btfels, {.light = SceneLight::kEnvironment}, {});
+  const auto point = MakeRefinement(tile_set, {}, {});
+  const auto sky = MakeRefinement(tile_set, {.light = SceneLight::kEnvironment}, {});
   ASSERT_TRUE(point.ok()) << point.status();
   ASSERT_TRUE(sky.ok()) << sky.status();
   EXPECT_NE(point->directions, sky->directions);
   EXPECT_TRUE(std::ranges::is_sorted(sky->rmse, std::greater()));
   // Soft light hides what changes fast with the light.
   EXPECT_LT(sky->rmse.front(), point->rmse.front());
-  EXPECT_EQ(MakeRefinement(tile_set.btfels, {.light = SceneLight::kEnvironment}, {})->cut.order,
-            sky->cut.order);
+  EXPECT_EQ(MakeRefinement(tile_set, {.light = SceneLight::kEnvironment}, {})->cut.order, sky->cut.order);
 }
 
 TEST(RefinementTest, StopsWhenAsked) {
   const TileSet tile_set = TileSetOf("dsh-cls", 4);
   std::stop_source stop;
   stop.request_stop();
-  EXPECT_TRUE(absl::IsCancelled(MakeRefinement(tile_set.btfels, {}, {.stop = stop.get_token()}).status()));
+  EXPECT_TRUE(absl::IsCancelled(MakeRefinement(tile_set, {}, {.stop = stop.get_token()}).status()));
 }
 
 }  // namespace

@@ -53,7 +53,7 @@ inline TileSet SmallTileSet(std::string_view arrangement_id, uint64_t seed = 1) 
   tile_set.seam_heat.assign(tile_set.tile_index.size(), 0);
   tile_set.seam_heat[5] = 70;
   tile_set.certificate = {{"ratio", 1.05}};
-  tile_set.metadata = {{"seed", 7}};
+  tile_set.metadata = {{"seed", 7}, {"exemplar", {{"width", 16}}}};
   tile_set.other_keys = {{"future_key", {1, 2}}};
   return tile_set;
 }

@@ -11,6 +11,7 @@
 
 #include "btf/base/sha256.h"
 #include "btf/codec/container.h"
+#include "btf/codec/container_frame.h"
 #include "btf/wang/dress.h"
 #include "btf/wang/redress.h"
 #include "btf/wang/scene_needs.h"
@@ -126,9 +127,9 @@ TEST(TileSetPartsTest, PartsComeInOrderAndFromOneSet) {
 // Changes one thing in a part and writes it again, checksums and all.
 template <typename Change>
 std::string Changed(const std::string& part, const Change& change) {
-  Container container = *ParseContainer(BytesOf(part));
+  Container container = *ParseFrame(BytesOf(part));
   change(container);
-  return *SerializeContainer(std::move(container));
+  return *FrameContainer(std::move(container));
 }
 
 Section& PartSection(Container& container, std::string_view name) {
@@ -174,42 +175,35 @@ TEST(TileSetPartsTest, DamagedPartsAreRefused) {
   EXPECT_TRUE(assembler->Add(BytesOf(parts[1])).ok());
 }
 
-// As levels are: each texel a BTFel of its own, in order.
-TileSet LevelLikeTileSet() {
+// Of an exemplar 20 pixels wide, in blocks of 8x8 pixels: its BTFels lie in three blocks. Tile 4 shows those
+// of the first alone.
+TileSet SetOfKnownPixels() {
   TileSet tile_set = SmallTileSet("surface-26");
-  const BtfelTable from = tile_set.btfels;
-  tile_set.btfels = from.WithoutCodes();
-  tile_set.source_pixels.clear();
-  for (size_t i = 0; i < tile_set.tile_index.size(); ++i) {
-    uint32_t& texel = tile_set.tile_index[i];
-    for (const uint8_t code : from.btfel(BtfelOfTexel(texel))) {
-      tile_set.btfels.codes.push_back(code);
-    }
-    texel = PackTexel(static_cast<uint32_t>(i), TurnsOfTexel(texel));
+  tile_set.metadata["exemplar"] = {{"width", 20}};
+  for (int i = 0; i < 64; ++i) {
+    tile_set.tile_index[4 * 64 + i] = PackTexel(i % 2, i % 4);
   }
   return tile_set;
 }
 
-// Coefficients 0 to 5 by two components of waves over the tile, the others in a second layer by one.
+// Coefficients 0 to 5 and 11 by two components and a third.
 TileSetCut LayeredCutOf(const TileSet& tile_set, std::vector<uint32_t> tiles = {}) {
-  const size_t num_tiles = tile_set.tile_codes.size();
-  TileSetLayers layers{.block_side = 8};
+  const size_t num_blocks = BlocksOf(tile_set.source_pixels, {.width = 20}, 8, 0).size();
+  TileSetLayers layers{.block_side = 8, .coefficients = {0, 1, 2, 3, 4, 5, 11}};
   for (int i = 0; i < 12; ++i) {
     layers.mean.push_back(0.1F * static_cast<float>(i));
     layers.scale.push_back(1.0F + static_cast<float>(i));
   }
-  TileSetLayer first{
-      .step = 0.25F, .coefficients = {0, 1, 2, 3, 4, 5}, .spans = {0, 0}, .basis_step = {0.01F, 0.5F}};
-  first.basis = {1, -2, 3, 0, 500, -6, 0, 0, 1, 1, 0, 0};
-  first.codes.assign(2 * 64 * num_tiles, 0);
-  TileSetLayer second{
-      .step = 0.01F, .coefficients = {6, 7, 8, 9, 10, 11}, .spans = {1}, .basis_step = {1.0F}};
-  second.basis = {1, 2, 3, 4, 5, 6};
-  second.codes.assign(3 * 64 * num_tiles, 0);
-  for (size_t tile = 0; tile < num_tiles; ++tile) {
-    first.codes[tile] = static_cast<int32_t>(tile) - 300;
-    first.codes[(64 + 5) * num_tiles + tile] = static_cast<int32_t>(tile % 3) - 1;
-    second.codes[(128 + 63) * num_tiles + tile] = static_cast<int32_t>(tile % 2);
+  TileSetLayer first{.step = 0.25F, .basis_step = {0.01F, 0.5F}};
+  first.basis = {1, -2, 3, 0, 500, -6, 7, 0, 0, 1, 1, 0, 0, 0};
+  first.codes.assign(2 * 64 * num_blocks, 0);
+  TileSetLayer second{.step = 0.01F, .basis_step = {1.0F}};
+  second.basis = {1, 2, 3, 4, 5, 6, 0};
+  second.codes.assign(3 * 64 * num_blocks, 0);
+  for (size_t block = 0; block < num_blocks; ++block) {
+    first.codes[block] = 300 * static_cast<int32_t>(block) - 300;
+    first.codes[(64 + 5) * num_blocks + block] = static_cast<int32_t>(block % 3) - 1;
+    second.codes[(128 + 63) * num_blocks + block] = static_cast<int32_t>(block % 2);
   }
   layers.layers = {std::move(first), std::move(second)};
   TileSetCut cut;
@@ -220,28 +214,31 @@ TileSetCut LayeredCutOf(const TileSet& tile_set, std::vector<uint32_t> tiles = {
 }
 
 TEST(TileSetPartsTest, LayersAddUpToTheirSum) {
-  const TileSet tile_set = LevelLikeTileSet();
-  for (const std::vector<uint32_t>& tiles : {std::vector<uint32_t>{}, std::vector<uint32_t>{4, 20}}) {
+  const TileSet tile_set = SetOfKnownPixels();
+  for (const std::vector<uint32_t>& tiles : {std::vector<uint32_t>{}, {4}, {4, 20}}) {
     const TileSetCut cut = LayeredCutOf(tile_set, tiles);
     const std::vector<std::string> parts = PartsOf(tile_set, cut);
     ASSERT_EQ(parts.size(), 2u);
-    LayerSum sum(8, 26, cut.layers->mean, cut.layers->scale);
+    LayerSum sum(BlocksOf(tile_set.source_pixels, {.width = 20}, 8, 0), cut.layers->coefficients,
+                 cut.layers->mean, cut.layers->scale);
     auto assembler = TileSetAssembler::Begin(BytesOf(parts[0]));
     ASSERT_TRUE(assembler.ok()) << assembler.status();
-    EXPECT_EQ(assembler->num_coefficients(), 6u);
+    EXPECT_EQ(assembler->num_coefficients(), 7u);
     for (size_t part = 0; part < 2; ++part) {
       ASSERT_TRUE(sum.Add(cut.layers->layers[part]).ok());
       if (part == 1) {
         ASSERT_TRUE(assembler->Add(BytesOf(parts[1])).ok());
       }
       const TileSet& got = assembler->tile_set();
-      ASSERT_EQ(got.btfels.size(), 64 * (tiles.empty() ? 26 : tiles.size()));
-      for (const uint32_t tile : {4u, 20u}) {
+      ASSERT_EQ(got.btfels.size(), tiles.size() == 1 ? 2u : got.source_pixels.size());
+      EXPECT_EQ(SourceGridOf(got)->width, 20);
+      for (const uint32_t tile : tiles.empty() ? std::vector<uint32_t>{4, 20} : tiles) {
         for (int texel = 0; texel < 64; ++texel) {
-          const std::vector<float> expected =
-              sum.Coefficients(std::vector<uint32_t>{tile * 64 + static_cast<uint32_t>(texel)});
+          const uint32_t whole = tile_set.tile_index[tile * 64 + texel];
+          const std::vector<float> expected = sum.Coefficients(std::vector<uint32_t>{BtfelOfTexel(whole)});
           const uint32_t packed = got.tile_index[tile * 64 + texel];
-          EXPECT_EQ(TurnsOfTexel(packed), TurnsOfTexel(tile_set.tile_index[tile * 64 + texel]));
+          EXPECT_EQ(TurnsOfTexel(packed), TurnsOfTexel(whole));
+          EXPECT_EQ(got.source_pixels[BtfelOfTexel(packed)], tile_set.source_pixels[BtfelOfTexel(whole)]);
           for (int i = 0; i < 12; ++i) {
             const float value =
                 got.btfels.offset[i] + got.btfels.step[i] * got.btfels.btfel(BtfelOfTexel(packed))[i];
@@ -255,8 +252,34 @@ TEST(TileSetPartsTest, LayersAddUpToTheirSum) {
   }
 }
 
+// Few patches, with lines between them that go on, take few bytes; random texels come back too.
+TEST(TileSetPartsTest, PatchesTakeFewBytesAndAllTexelsComeBack) {
+  const auto index_bytes = [](const TileSet& tile_set) {
+    const std::vector<std::string> parts = PartsOf(tile_set, CutOf(tile_set));
+    auto assembler = TileSetAssembler::Begin(BytesOf(parts[0]));
+    EXPECT_TRUE(assembler.ok()) << assembler.status();
+    EXPECT_EQ(assembler->tile_set().tile_index, tile_set.tile_index);
+    return ParseFrame(BytesOf(parts[0]))->Find("tile_patches")->bytes.size();
+  };
+  TileSet tile_set = SmallTileSet("surface-26");
+  tile_set.metadata["exemplar"] = {{"width", 10}};
+  for (uint32_t i = 0; i < 50; ++i) {
+    tile_set.source_pixels[i] = i;
+  }
+  const size_t texels = tile_set.tile_index.size();
+  EXPECT_GT(index_bytes(tile_set), texels / 2);
+  // Of each tile the left half as the exemplar is, the right half turned.
+  for (size_t i = 0; i < texels; ++i) {
+    const auto x = static_cast<uint32_t>(i % 8);
+    const auto y = static_cast<uint32_t>(i / 8 % 8);
+    tile_set.tile_index[i] = x < 4 ? PackTexel(y % 5 * 10 + x, 0) : PackTexel((x - 4) * 10 + 9 - y, 1);
+  }
+  // Rows wrap after the fifth.
+  EXPECT_LT(index_bytes(tile_set), texels / 5);
+}
+
 TEST(TileSetPartsTest, DamagedLayersAreRefused) {
-  const TileSet tile_set = LevelLikeTileSet();
+  const TileSet tile_set = SetOfKnownPixels();
   const std::vector<std::string> parts = PartsOf(tile_set, LayeredCutOf(tile_set));
   const auto begin_fails = [&](const auto& change, const char* what) {
     const auto assembler = TileSetAssembler::Begin(BytesOf(Changed(parts[0], change)));
@@ -270,27 +293,36 @@ TEST(TileSetPartsTest, DamagedLayersAreRefused) {
   begin_fails([&](Container& c) { set(c, "layer_step", 0, 0x7fc00000); }, "step nan");
   begin_fails([&](Container& c) { set(c, "basis_step", 1, 0xbf800000); }, "basis_step");
   begin_fails([&](Container& c) { set(c, "basis_step", 0, 0x7f7fffff); }, "coefficients up to");
-  begin_fails([&](Container& c) { set(c, "spans", 1, 1); }, "'spans': layer 1");
+  begin_fails([&](Container& c) { set(c, "coefficients", 1, 0); }, "'coefficients': 0 of 12");
+  begin_fails([&](Container& c) { set(c, "coefficients", 1, 12); }, "'coefficients': 12 of 12");
   begin_fails([&](Container& c) { set(c, "reach", 0, 65); }, "'reach': 2 values");
-  begin_fails([&](Container& c) { set(c, "reach", 0, 2); }, "'codes'");
   begin_fails([&](Container& c) { set(c, "scale", 3, 0x7f800000); }, "'scale'");
-  begin_fails([&](Container& c) { PartSection(c, "codes").bytes[0] = 3; }, "'codes_large'");
   begin_fails(
-      [&](Container& c) {
-        Section& large = PartSection(c, "basis_large");
-        large.shape[0] = 0;
-        large.bytes.clear();
+      [](Container& c) {
+        Section& codes = PartSection(c, "codes");
+        codes.bytes += "left";
+        codes.shape[0] += 4;
       },
-      "'basis_large'");
-  begin_fails([](Container& c) { c.header["block_side"] = 7; }, "block_side 7");
+      "section 'codes': the numbers end");
+  begin_fails([](Container& c) { c.header["block_side"] = 513; }, "block_side");
   begin_fails([](Container& c) { c.header["block_side"] = 0; }, "block_side");
   begin_fails([](Container& c) { c.header.erase("block_side"); }, "block_side");
+  begin_fails([](Container& c) { c.header["level"] = 13; }, "level");
+  begin_fails([](Container& c) { c.header["exemplar_width"] = 0; }, "exemplar_width");
+  begin_fails([](Container& c) { c.header["footprint"] = -1; }, "footprint");
+  begin_fails([](Container& c) { c.header["tile_size"] = 5000; }, "tile_size");
+  begin_fails(
+      [](Container& c) {
+        Section& patches = PartSection(c, "tile_patches");
+        patches.bytes.assign(patches.bytes.size(), '\0');
+      },
+      "tile_patches");
 
   auto assembler = TileSetAssembler::Begin(BytesOf(parts[0]));
   ASSERT_TRUE(assembler.ok());
-  const std::string repeated = Changed(parts[1], [&](Container& c) { set(c, "coefficients", 0, 5); });
-  EXPECT_FALSE(assembler->Add(BytesOf(repeated)).ok());
-  EXPECT_EQ(assembler->num_coefficients(), 6u);
+  const std::string damaged = Changed(parts[1], [&](Container& c) { set(c, "layer_step", 0, 0); });
+  EXPECT_FALSE(assembler->Add(BytesOf(damaged)).ok());
+  EXPECT_EQ(assembler->num_parts(), 1u);
   EXPECT_TRUE(assembler->Add(BytesOf(parts[1])).ok());
 }
 
@@ -305,8 +337,8 @@ TEST(TileSetPartsTest, LayersComeBetweenExactCoefficients) {
   TileSetLayers layers;
   layers.mean.assign(12, 2.0F);
   layers.scale.assign(12, 1.0F);
-  TileSetLayer layer{.step = 1.0F, .spans = {0}, .basis_step = {1.0F}};
-  layer.coefficients = {0, 1, 2, 4, 5, 6, 7, 9, 10, 11};
+  layers.coefficients = {0, 1, 2, 4, 5, 6, 7, 9, 10, 11};
+  TileSetLayer layer{.step = 1.0F, .basis_step = {1.0F}};
   layer.basis.assign(10, 1);
   for (int btfel = 0; btfel < 50; ++btfel) {
     layer.codes.push_back(btfel);
@@ -345,7 +377,7 @@ TEST(TileSetPartsTest, LayersComeBetweenExactCoefficients) {
 }
 
 TEST(TileSetPartsTest, CutsIntoLayersAreChecked) {
-  const TileSet tile_set = LevelLikeTileSet();
+  const TileSet tile_set = SetOfKnownPixels();
   const auto refused = [&](const auto& change, const char* what) {
     TileSetCut cut = LayeredCutOf(tile_set);
     TileSetLayers layers = *cut.layers;
@@ -356,18 +388,11 @@ TEST(TileSetPartsTest, CutsIntoLayersAreChecked) {
     EXPECT_THAT(status.message(), HasSubstr(what));
   };
   refused([](TileSetLayers& layers) { layers.mean.pop_back(); }, "mean of 11");
-  refused([](TileSetLayers& layers) { layers.layers[1].spans = {2}; }, "layer 2");
-  refused([](TileSetLayers& layers) { layers.tables["luma"] = {}; }, "table 'luma'");
-  refused([](TileSetLayers& layers) { layers.block_side = 7; }, "blocks of 49 of 1664 BTFels");
-  // Tiles of part of a block.
-  TileSetCut cut = LayeredCutOf(tile_set, {1});
-  TileSetLayers layers = *cut.layers;
-  layers.block_side = 16;
-  for (TileSetLayer& layer : layers.layers) {
-    layer.codes.resize(layer.codes.size() / 26 * 26);
-  }
-  cut.layers = std::make_shared<const TileSetLayers>(std::move(layers));
-  EXPECT_FALSE(TileSetCutter::Create(tile_set, std::move(cut)).ok());
+  refused([](TileSetLayers& layers) { layers.coefficients[0] = 1; }, "coefficient 1 of 12");
+  refused([](TileSetLayers& layers) { layers.bases.emplace().mean = {1.0F}; }, "1 means");
+  refused([](TileSetLayers& layers) { layers.layers[1].cores = {1}; }, "no bases");
+  refused([](TileSetLayers& layers) { layers.block_side = 0; }, "blocks of side 0");
+  refused([](TileSetLayers& layers) { layers.block_side = 7; }, "images: 384 of ");
 }
 
 TEST(SceneNeedsTest, FollowFromADressingAndItsSize) {
