@@ -2,8 +2,9 @@
 // texel a pixel and bilinear, against its limit; making it ready, and the first picture with its shaders,
 // once; the same under light from all around, in the frequency domain and, of "dsh" 25x25, as 50 lights with
 // shadows. Beside the median of the wall clock stands the least processor time by the number of cores, which
-// others on the machine hardly change. Prints `name,value,unit,limit,verdict`; exits 1 when a limit is
-// missed.
+// others on the machine hardly change. Beside it, too, what bounds it: the fetches of BTFels and factors a
+// pixel, counted in the shaders, and what one took; of 50 lights as many pictures under one. Prints
+// `name,value,unit,limit,verdict`; exits 1 when a limit is missed.
 #include <sys/resource.h>
 
 #include <algorithm>
@@ -137,14 +138,44 @@ std::unique_ptr<GlPreview> Prepare(OffscreenContext& context, const Frame& frame
   return *std::move(preview);
 }
 
-bool PrintCost(const std::string& name, const Cost& cost, double limit) {
+// `fetches` a pixel; 0 where they are not counted.
+bool PrintCost(const std::string& name, const Cost& cost, double limit, int fetches) {
   Print(name + "_processor", cost.processor, "s", 0.0);
+  if (fetches > 0) {
+    constexpr double kPixels = 640.0 * 480.0;
+    Print(name + "_fetches", fetches, "a pixel", 0.0);
+    Print(name + "_fetch", 1e9 * cost.wall / (fetches * kPixels), "ns", 0.0);
+  }
   return Print(name, cost.wall, "s", limit);
+}
+
+// Of a codec's shaders, a pixel: one tap, bilinear, bilinear under 25 harmonics.
+struct Fetches {
+  int nearest = 0;
+  int bilinear = 0;
+  int sky = 0;
+};
+constexpr Fetches kDshFetches = {.nearest = 250, .bilinear = 1000, .sky = 1000};  // 25x25
+
+// A light's or a view's direction lies between three nodes. Groups are of eight coefficients: `luma` of them
+// have a texel for each node of the pair, or for each harmonic at a node of the view; `chroma` of them two,
+// but one for both under the 16 harmonics above degree 2.
+Fetches DfmfFetches(const BtfelTable& table) {
+  constexpr int kPairs = 9;
+  constexpr int kViews = 3;
+  constexpr int kTaps = 4;
+  constexpr int kGroup = 8;
+  const auto luma_rank = static_cast<int>(table.tables.at("luma").shape.back());
+  const int luma = (luma_rank + kGroup - 1) / kGroup;
+  const int chroma = (table.num_coefficients - luma_rank + kGroup - 1) / kGroup;
+  return {.nearest = kPairs * (luma + 2 * chroma) + luma + chroma,
+          .bilinear = kPairs * (luma + 2 * chroma) + kTaps * (luma + chroma),
+          .sky = kViews * (25 * luma + (2 * 9 + 16) * chroma) + kTaps * (luma + chroma)};
 }
 
 // Limits in seconds, 0 for none.
 bool TimeCodec(OffscreenContext& context, const std::string& name, BtfelTable btfels, double nearest_limit,
-               double bilinear_limit, double sky_limit) {
+               double bilinear_limit, double sky_limit, const Fetches& fetches) {
   Frame frame(std::move(btfels), kTexelsPerPixel);
   auto start = Clock::now();
   std::unique_ptr<GlPreview> preview = Prepare(context, frame);
@@ -159,7 +190,8 @@ bool TimeCodec(OffscreenContext& context, const std::string& name, BtfelTable bt
     const bool is_nearest = filter == Filter::kNearest;
     frame.scene.filter = filter;
     ok &= PrintCost(name + (is_nearest ? "_nearest" : "_bilinear"), TimePicture(*preview, frame.scene),
-                    is_nearest ? nearest_limit : bilinear_limit);
+                    is_nearest ? nearest_limit : bilinear_limit,
+                    is_nearest ? fetches.nearest : fetches.bilinear);
   }
   // Light from all around alone, in the frequency domain, bilinear.
   const FrequencyLight sky = testing::RandomFrequencyLight(25, 6);
@@ -169,7 +201,7 @@ bool TimeCodec(OffscreenContext& context, const std::string& name, BtfelTable bt
   start = Clock::now();
   (void)preview->Render(under_sky, {});
   Print(name + "_sky_first_with_shaders", SecondsSince(start), "s", 0.0);
-  ok &= PrintCost(name + "_sky", TimePicture(*preview, under_sky), sky_limit);
+  ok &= PrintCost(name + "_sky", TimePicture(*preview, under_sky), sky_limit, fetches.sky);
   PreviewScene small = frame.scene;
   small.width = 160;
   small.height = 120;
@@ -196,16 +228,18 @@ int Run() {
   constexpr double kDshBilinear = 0.5;
   constexpr double kSky = 0.3;  // 25 harmonics
   const auto dsh = [] { return testing::RandomBtfels(kBtfels, 25, 25, 3, testing::BasisKind::kOrthonormal); };
-  bool ok = TimeCodec(**context, "dsh_25x25", dsh(), kDshNearest, kDshBilinear, kSky);
+  bool ok = TimeCodec(**context, "dsh_25x25", dsh(), kDshNearest, kDshBilinear, kSky, kDshFetches);
   for (const int rank : {24, 48}) {
     BtfelTable btfels = EncodedBtfels("dfmf", {.rank = rank});
+    const Fetches fetches = DfmfFetches(btfels);
     ok &= TimeCodec(**context, absl::StrCat("dfmf_", rank), std::move(btfels), kDshNearest / 3.0,
-                    kDshBilinear / 3.0, kSky);
+                    kDshBilinear / 3.0, kSky, fetches);
   }
-  ok &= TimeCodec(**context, "view-pca_5", EncodedBtfels("view-pca", {.eigen_textures = 5}), 0.0, 0.0, kSky);
+  ok &= TimeCodec(**context, "view-pca_5", EncodedBtfels("view-pca", {.eigen_textures = 5}), 0.0, 0.0, kSky,
+                  {});
 
   // Hardly any decoding: what all codecs' pictures cost beside it.
-  ok &= TimeCodec(**context, "dsh_1x1", testing::RandomBtfels(kBtfels, 1, 1, 3), 0.0, 0.0, 0.0);
+  ok &= TimeCodec(**context, "dsh_1x1", testing::RandomBtfels(kBtfels, 1, 1, 3), 0.0, 0.0, 0.0, {});
 
   // An environment as lights with shadows: the bound is as many pictures under one light.
   Frame lit(dsh(), kTexelsPerPixel);
@@ -214,15 +248,20 @@ int Run() {
   const std::unique_ptr<GlPreview> lit_preview = Prepare(**context, lit);
   for (const Filter filter : {Filter::kNearest, Filter::kBilinear}) {
     lit.scene.filter = filter;
+    const bool is_nearest = filter == Filter::kNearest;
+    const std::string name =
+        absl::StrCat("dsh_25x25_50_lights_shadows_", is_nearest ? "nearest" : "bilinear");
     const auto start = Clock::now();
     (void)lit_preview->Render(lit.scene, {});
-    ok &= Print(filter == Filter::kNearest ? "dsh_25x25_50_lights_shadows_nearest"
-                                           : "dsh_25x25_50_lights_shadows_bilinear",
-                SecondsSince(start), "s", filter == Filter::kNearest ? kLitNearest : kLitBilinear);
+    ok &= Print(name, SecondsSince(start), "s", is_nearest ? kLitNearest : kLitBilinear);
+    PreviewScene single = lit.scene;
+    single.shadows.reset();
+    single.lights.resize(1);
+    Print(name + "_as_many_pictures", kEnvironmentLights * TimePicture(*lit_preview, single).wall, "s", 0.0);
   }
 
   const Frame minified(dsh(), 2.5);
-  PrintCost("dsh_25x25_minified", TimePicture(*Prepare(**context, minified), minified.scene), 0.0);
+  PrintCost("dsh_25x25_minified", TimePicture(*Prepare(**context, minified), minified.scene), 0.0, 0);
   return ok ? 0 : 1;
 }
 
