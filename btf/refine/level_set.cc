@@ -259,7 +259,7 @@ absl::StatusOr<LevelSet> MakeLevelSet(const TileSet& tile_set, int level, const 
                                                    tile_set.tile_size, " texels have levels 1 to ", last));
   }
   const std::optional<SourceGrid> grid = SourceGridOf(tile_set);
-  if (!grid.has_value() || grid->footprint != 1 || tile_set.source_pixels.back() > kLargestPackedBtfel) {
+  if (!grid.has_value() || grid->footprint != 1) {
     return absl::FailedPreconditionError(
         "the tile set does not record where its BTFels lie in the exemplar: synthesise it again");
   }

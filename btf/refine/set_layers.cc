@@ -94,14 +94,9 @@ Components PrincipalComponents(const FloatRows& values, const FloatRows& weights
   return components;
 }
 
-// Of the whole exemplar where pixels are known.
 LayerBlocks BlocksOfSet(const TileSet& tile_set, int level) {
-  if (const std::optional<SourceGrid> grid = SourceGridOf(tile_set)) {
-    return BlocksOf(tile_set.source_pixels, *grid, kBlockSide, level);
-  }
-  std::vector<uint32_t> numbers(tile_set.btfels.size());
-  std::iota(numbers.begin(), numbers.end(), 0U);
-  return BlocksOf(numbers, {}, 1, level);
+  const BtfelLabels labels = LabelsOf(tile_set);
+  return BlocksOf(labels.pixels, labels.grid, labels.are_pixels ? kBlockSide : 1, level);
 }
 
 // Pixels of blocks that no BTFel has: what is best there is what costs fewest cosines, so values go on into

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <array>
 #include <functional>
+#include <numeric>
+#include <optional>
 
 #include <absl/strings/str_cat.h>
 
@@ -88,7 +90,9 @@ absl::Status CheckTileSet(const TileSet& tile_set) {
 
 std::optional<SourceGrid> SourceGridOf(const TileSet& tile_set) {
   const auto exemplar = tile_set.metadata.find("exemplar");
-  if (tile_set.source_pixels.empty() || exemplar == tile_set.metadata.end() || !exemplar->is_object()) {
+  const std::vector<uint32_t>& pixels = tile_set.source_pixels;
+  if (pixels.empty() || pixels.size() != tile_set.btfels.size() || pixels.back() > kLargestPackedBtfel ||
+      exemplar == tile_set.metadata.end() || !exemplar->is_object()) {
     return std::nullopt;
   }
   const auto read = [&exemplar](const char* key, int64_t fallback) {
@@ -101,6 +105,16 @@ std::optional<SourceGrid> SourceGridOf(const TileSet& tile_set) {
     return std::nullopt;
   }
   return SourceGrid{.width = static_cast<int>(width), .footprint = static_cast<int>(footprint)};
+}
+
+BtfelLabels LabelsOf(const TileSet& tile_set) {
+  if (const std::optional<SourceGrid> grid = SourceGridOf(tile_set)) {
+    return {.pixels = tile_set.source_pixels, .grid = *grid, .are_pixels = true};
+  }
+  BtfelLabels labels;
+  labels.pixels.resize(tile_set.btfels.size());
+  std::iota(labels.pixels.begin(), labels.pixels.end(), 0U);
+  return labels;
 }
 
 absl::StatusOr<std::string> SerializeTileSet(const TileSet& tile_set) {

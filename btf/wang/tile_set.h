@@ -65,8 +65,18 @@ struct SourceGrid {
 // Largest of either.
 inline constexpr int kMostGridWidth = 1 << 24;
 
-// As metadata.exemplar states it; nothing where it or source_pixels is missing.
+// As metadata.exemplar states it; nothing where it or source_pixels is missing, or PackTexel cannot hold
+// them.
 [[nodiscard]] std::optional<SourceGrid> SourceGridOf(const TileSet& tile_set);
+
+// What BTFels go by where a tile set is sent.
+struct BtfelLabels {
+  std::vector<uint32_t>
+      pixels;  // [BTFels], ascending: source_pixels where SourceGridOf knows them, else 0, 1, ..
+  SourceGrid grid;
+  bool are_pixels = false;
+};
+[[nodiscard]] BtfelLabels LabelsOf(const TileSet& tile_set);
 
 // What both of the functions below check. Errors: those of theirs that are about more than bytes.
 [[nodiscard]] absl::Status CheckTileSet(const TileSet& tile_set);

@@ -19,25 +19,6 @@
 namespace tessera {
 namespace {
 
-// What the texels of a part name.
-struct Labels {
-  std::vector<uint32_t> pixels;  // [BTFels]: of the exemplar, where these are known, else the BTFels' numbers
-  SourceGrid grid;
-  bool are_pixels = false;
-};
-
-Labels LabelsOf(const TileSet& tile_set) {
-  const std::optional<SourceGrid> grid = SourceGridOf(tile_set);
-  const std::vector<uint32_t>& pixels = tile_set.source_pixels;
-  if (grid.has_value() && pixels.size() == tile_set.btfels.size() && pixels.back() <= kLargestPackedBtfel) {
-    return {.pixels = pixels, .grid = *grid, .are_pixels = true};
-  }
-  Labels labels;
-  labels.pixels.resize(tile_set.btfels.size());
-  std::iota(labels.pixels.begin(), labels.pixels.end(), 0U);
-  return labels;
-}
-
 absl::Status CheckTiles(const TileSet& tile_set, const TileSetCut& cut) {
   if (std::ranges::adjacent_find(cut.tiles, std::greater_equal()) != cut.tiles.end() ||
       (!cut.tiles.empty() && cut.tiles.back() >= tile_set.tile_codes.size())) {
@@ -102,7 +83,7 @@ absl::Status CheckLayers(const TileSetCut& cut, const TileSet& tile_set, const C
     TESSERA_ASSIGN_OR_RETURN(
         cores, CoreSum::Create(tile_set.btfels, AngularTablesOf(tile_set.btfels, tables), *layers.bases));
   }
-  const Labels labels = LabelsOf(tile_set);
+  const BtfelLabels labels = LabelsOf(tile_set);
   LayerSum sum(BlocksOf(labels.pixels, labels.grid, layers.block_side, layers.level), layers.coefficients,
                layers.mean, layers.scale);
   for (const TileSetLayer& layer : layers.layers) {
@@ -233,7 +214,7 @@ void TileSetCutter::FindBlocks() {
   if (cut_.layers == nullptr) {
     return;
   }
-  const Labels labels = LabelsOf(*tile_set_);
+  const BtfelLabels labels = LabelsOf(*tile_set_);
   const LayerBlocks all = BlocksOf(labels.pixels, labels.grid, cut_.layers->block_side, cut_.layers->level);
   num_blocks_ = all.size();
   for (const uint32_t btfel : btfels_) {
@@ -257,7 +238,7 @@ absl::Status TileSetCutter::AddHead(Container& container) const {
                                      {"sha256", tile_set_->arrangement_sha256}};
   container.header["strip_height"] = tile_set_->strip_height;
   container.header["radiometry"] = tile_set_->radiometry;
-  const Labels labels = LabelsOf(*tile_set_);
+  const BtfelLabels labels = LabelsOf(*tile_set_);
   container.header["labels"] = labels.are_pixels ? kPixelLabels : kBtfelLabels;
   container.header["exemplar_width"] = labels.grid.width;
   container.header["footprint"] = labels.grid.footprint;

@@ -49,19 +49,24 @@ struct Layout {
   [[nodiscard]] int btfel_texels() const { return luma_groups + chroma_groups; }
 };
 
-// Factors under harmonics, `harmonics_words`: for each view node the groups of luminance, a texel for each
-// harmonic; then those of chrominance, for each of the first harmonics a texel for either, for each of the
-// others, which matter less, one of bytes for both. `harmonics_values`: what one step is worth, of each group
-// of luminance; of each of chrominance that of either in 16 bits, then in bytes.
+// Factors under harmonics go by pairs of groups: two of luminance, which take codes of their own, then one of
+// luminance that may be left, alone, then either chrominance, which take the same codes. `harmonics_words`:
+// for each view node, of each pair, for each of the first harmonics a texel for either group, for each of the
+// others, which matter less, one of bytes for both; of a group alone a texel for each harmonic.
+// `harmonics_values`, of each pair or group alone: what one step is worth, of the first group and the second
+// in 16 bits, then in bytes.
 struct HarmonicsLayout {
   int luma_groups = 0;
   int chroma_groups = 0;
   int n = 0;
 
-  [[nodiscard]] int num_low() const { return std::min(n, 9); }       // degrees 0 to 2
-  [[nodiscard]] int chroma_texels() const { return num_low() + n; }  // of a group
-  [[nodiscard]] int luma_texels() const { return luma_groups * n; }
-  [[nodiscard]] int texels() const { return luma_texels() + chroma_groups * chroma_texels(); }  // of a node
+  [[nodiscard]] int num_low() const { return std::min(n, 4); }     // degrees 0 and 1
+  [[nodiscard]] int pair_texels() const { return num_low() + n; }  // of a pair
+  [[nodiscard]] int luma_pairs() const { return luma_groups / 2; }
+  [[nodiscard]] bool has_single() const { return luma_groups % 2 == 1; }
+  [[nodiscard]] int luma_texels() const { return luma_pairs() * pair_texels() + (has_single() ? n : 0); }
+  [[nodiscard]] int luma_values() const { return luma_pairs() + (has_single() ? 1 : 0); }
+  [[nodiscard]] int texels() const { return luma_texels() + chroma_groups * pair_texels(); }  // of a node
 };
 
 constexpr char kHead[] = R"(
@@ -115,16 +120,16 @@ std::string Interpolate(const std::string& group, const std::string& suffix) {
 }
 
 // The weighted sum of the BTFels' codes in group `group`.
-std::string BlendCodes(const std::string& group, int btfel_texels) {
-  return absl::Substitute(R"(    vec4 even_codes = vec4(0.0), odd_codes = vec4(0.0);
+std::string BlendCodes(const std::string& group, int btfel_texels, const std::string& suffix = "") {
+  return absl::Substitute(R"(    vec4 even_codes$2 = vec4(0.0), odd_codes$2 = vec4(0.0);
     n = 0;
     do {
       u = texelFetch(btfel_words, btfels[n] * $1 + $0);
-      even_codes += weights[n] * Low(u);
-      odd_codes += weights[n] * High(u);
+      even_codes$2 += weights[n] * Low(u);
+      odd_codes$2 += weights[n] * High(u);
     } while (++n < count);
 )",
-                          group, btfel_texels);
+                          group, btfel_texels, suffix);
 }
 
 std::string Source(const Layout& layout) {
@@ -172,10 +177,10 @@ vec3 BlendUnturned(ivec4 btfels, vec4 weights, int count, Incidence light, vec3 
   return out;
 }
 
-// GLSL of what words u0, u1 and u2 of the three nodes make of the blended codes, read by `low` and `high`.
-std::string AtNodes(const std::string& low, const std::string& high) {
+// GLSL of what words u0, u1 and u2 of the three nodes, read by `low` and `high`, make of the blended codes.
+std::string AtNodes(const std::string& low, const std::string& high, const std::string& codes) {
   const auto at = [&](int node) {
-    return absl::Substitute("dot($0(u$2), even_codes) + dot($1(u$2), odd_codes)", low, high, node);
+    return absl::Substitute("dot($0(u$2), even_codes$3) + dot($1(u$2), odd_codes$3)", low, high, node, codes);
   };
   return absl::StrCat("vec3(", at(0), ", ", at(1), ", ", at(2), ")");
 }
@@ -183,44 +188,33 @@ std::string AtNodes(const std::string& low, const std::string& high) {
 // Adds to the colour `sum` what words `texel` of the three nodes and the blended codes are under harmonic
 // `i`.
 std::string AddAtNodes(int texel, const std::string& sum, const std::string& low, const std::string& high,
-                       int i) {
+                       const std::string& codes, int i) {
   return absl::Substitute(R"(    u0 = texelFetch(harmonics_words, at.x + $0);
     u1 = texelFetch(harmonics_words, at.y + $0);
     u2 = texelFetch(harmonics_words, at.z + $0);
     $1 += dot(view_weights, $2) * light[$3];
 )",
-                          texel, sum, AtNodes(low, high), i);
+                          texel, sum, AtNodes(low, high, codes), i);
 }
 
-// Adds to the colour `luma` what the blended codes of group g are under each of `n` harmonics.
-std::string AddLumaUnderHarmonics(int n) {
-  std::string out = absl::Substitute("    at = words + g * $0;\n    of_group = vec3(0.0);\n", n);
-  for (int i = 0; i < n; ++i) {
-    absl::StrAppend(&out, AddAtNodes(i, "of_group", "Low", "High", i));
-  }
-  absl::StrAppend(&out, "    luma += texelFetch(harmonics_values, g).x * of_group;\n");
-  return out;
-}
-
-// Likewise both chrominances, to `first_chroma` and `second_chroma`.
-std::string AddChromaUnderHarmonics(const HarmonicsLayout& harmonics) {
-  std::string out = absl::Substitute(
-      "    at = words + $0 + g * $1;\n    of_group = of_second = high_first = high_second = vec3(0.0);\n",
-      harmonics.luma_texels(), harmonics.chroma_texels());
+// Adds a pair of groups, whose words begin at `at` and whose steps are `scales`, to the colours `first` and
+// `second`; these may be the same. `codes`: the suffix of the second group's.
+std::string AddPair(const HarmonicsLayout& harmonics, const std::string& first, const std::string& second,
+                    const std::string& codes) {
+  std::string out = "    of_first = of_second = high_first = high_second = vec3(0.0);\n";
   for (int i = 0; i < harmonics.num_low(); ++i) {
-    absl::StrAppend(&out, AddAtNodes(2 * i, "of_group", "Low", "High", i),
-                    AddAtNodes(2 * i + 1, "of_second", "Low", "High", i));
+    absl::StrAppend(&out, AddAtNodes(2 * i, "of_first", "Low", "High", "", i),
+                    AddAtNodes(2 * i + 1, "of_second", "Low", "High", codes, i));
   }
   for (int i = harmonics.num_low(); i < harmonics.n; ++i) {
-    absl::StrAppend(&out, AddAtNodes(harmonics.num_low() + i, "high_first", "Byte0", "Byte1", i),
+    absl::StrAppend(&out, AddAtNodes(harmonics.num_low() + i, "high_first", "Byte0", "Byte1", "", i),
                     absl::Substitute("    high_second += dot(view_weights, $0) * light[$1];\n",
-                                     AtNodes("Byte2", "High"), i));
+                                     AtNodes("Byte2", "High", codes), i));
   }
-  absl::StrAppend(&out, absl::Substitute(R"(    scales = texelFetch(harmonics_values, $0 + g);
-    first_chroma += scales.x * of_group + scales.z * high_first;
-    second_chroma += scales.y * of_second + scales.w * high_second;
+  absl::StrAppend(&out, absl::Substitute(R"(    $0 += scales.x * of_first + scales.z * high_first;
+    $1 += scales.y * of_second + scales.w * high_second;
 )",
-                                         harmonics.luma_groups));
+                                         first, second));
   return out;
 }
 
@@ -237,22 +231,42 @@ vec4 Byte2(uvec4 u) { return vec4(ivec4(u << 8)); }
 vec3 BlendUnturned(ivec4 btfels, vec4 weights, int count, Incidence light, vec3 view) {
   bool is_lit = view.z > 0.0 && count > 0;
   ivec3 view_nodes, at;
-  vec3 view_weights, of_group, of_second, high_first, high_second;
+  vec3 view_weights, of_first, of_second, high_first, high_second;
   vec3 luma = vec3(0.0), first_chroma = vec3(0.0), second_chroma = vec3(0.0);
   vec4 scales;
   FindNodes(view, texelFetch(codec_values, 0).z, $0, view_nodes, view_weights);
   ivec3 words = view_nodes * $1;
   uvec4 u, u0, u1, u2;
-  int n, g = 0;
-  do {
+  int n, g;
 )",
-                       layout.view_nodes, harmonics.texels()),
-      BlendCodes("g", layout.btfel_texels()), AddLumaUnderHarmonics(harmonics.n), "  } while (++g < ",
-      layout.luma_groups, ");\n");
+                       layout.view_nodes, harmonics.texels()));
+  const int btfel_texels = layout.btfel_texels();
+  if (harmonics.luma_pairs() > 0) {
+    absl::StrAppend(
+        &out, "  g = 0;\n  do {\n", BlendCodes("2 * g", btfel_texels),
+        BlendCodes("2 * g + 1", btfel_texels, "1"),
+        absl::Substitute("    at = words + g * $0;\n    scales = texelFetch(harmonics_values, g);\n",
+                         harmonics.pair_texels()),
+        AddPair(harmonics, "luma", "luma", "1"), "  } while (++g < ", harmonics.luma_pairs(), ");\n");
+  }
+  if (harmonics.has_single()) {
+    absl::StrAppend(&out, "  {\n", BlendCodes(absl::StrCat(layout.luma_groups - 1), btfel_texels),
+                    absl::Substitute("    at = words + $0;\n    of_first = vec3(0.0);\n",
+                                     harmonics.luma_pairs() * harmonics.pair_texels()));
+    for (int i = 0; i < harmonics.n; ++i) {
+      absl::StrAppend(&out, AddAtNodes(i, "of_first", "Low", "High", "", i));
+    }
+    absl::StrAppend(&out, "    luma += texelFetch(harmonics_values, ", harmonics.luma_pairs(),
+                    ").x * of_first;\n  }\n");
+  }
   if (layout.chroma_groups > 0) {
-    const std::string first = absl::StrCat("g + ", layout.luma_groups);
-    absl::StrAppend(&out, "  g = 0;\n  do {\n", BlendCodes(first, layout.btfel_texels()),
-                    AddChromaUnderHarmonics(harmonics), "  } while (++g < ", layout.chroma_groups, ");\n");
+    absl::StrAppend(&out, "  g = 0;\n  do {\n",
+                    BlendCodes(absl::StrCat("g + ", layout.luma_groups), btfel_texels),
+                    absl::Substitute(
+                        "    at = words + $0 + g * $1;\n    scales = texelFetch(harmonics_values, $2 + g);\n",
+                        harmonics.luma_texels(), harmonics.pair_texels(), harmonics.luma_values()),
+                    AddPair(harmonics, "first_chroma", "second_chroma", ""), "  } while (++g < ",
+                    layout.chroma_groups, ");\n");
   }
   absl::StrAppend(&out, R"(
   vec3 value = luma * texelFetch(codec_values, 1).xyz + first_chroma * texelFetch(codec_values, 2).xyz +
@@ -346,7 +360,7 @@ void PackFactorsUnderHarmonics(const DfmfDecoder& decoder, std::span<const float
   for (int view = 0; view < num_views; ++view) {
     factors[view] = decoder.FactorsUnderHarmonics({{view, view, view}, {1.0, 0.0, 0.0}}, harmonics.n);
   }
-  glsl.values.assign(4 * static_cast<size_t>(harmonics.luma_groups + harmonics.chroma_groups), 0.0F);
+  glsl.values.assign(4 * static_cast<size_t>(harmonics.luma_values() + harmonics.chroma_groups), 0.0F);
   glsl.words.assign(static_cast<size_t>(num_views) * harmonics.texels() * 4, 0);
   // Of harmonics first .. last - 1 of a group, the texel of each at a view node, at `step` from one to the
   // next; bits 8 are bytes `first_byte` and the next of each word.
@@ -380,19 +394,28 @@ void PackFactorsUnderHarmonics(const DfmfDecoder& decoder, std::span<const float
     return std::ldexp(most / most_code, bits - 32 - 16);
   };
   const int n = harmonics.n;
-  for (int g = 0; g < harmonics.luma_groups; ++g) {
-    glsl.values[4 * static_cast<size_t>(g)] = pack(groups[static_cast<size_t>(g)], 0, n, g * n, 1, 16, 0);
+  const int low = harmonics.num_low();
+  const auto pack_pair = [&](int first, int second, int texel, int value) {
+    const Group& one = groups[static_cast<size_t>(first)];
+    const Group& other = groups[static_cast<size_t>(second)];
+    float* const values = &glsl.values[4 * static_cast<size_t>(value)];
+    values[0] = pack(one, 0, low, texel, 2, 16, 0);
+    values[1] = pack(other, 0, low, texel + 1, 2, 16, 0);
+    values[2] = pack(one, low, n, texel + 2 * low, 1, 8, 0);
+    values[3] = pack(other, low, n, texel + 2 * low, 1, 8, 2);
+  };
+  for (int g = 0; g < harmonics.luma_pairs(); ++g) {
+    pack_pair(2 * g, 2 * g + 1, g * harmonics.pair_texels(), g);
+  }
+  if (harmonics.has_single()) {
+    const int pairs = harmonics.luma_pairs();
+    glsl.values[4 * static_cast<size_t>(pairs)] =
+        pack(groups[static_cast<size_t>(2 * pairs)], 0, n, pairs * harmonics.pair_texels(), 1, 16, 0);
   }
   for (int g = 0; g < harmonics.chroma_groups; ++g) {
-    const int texel = harmonics.luma_texels() + g * harmonics.chroma_texels();
-    float* const values = &glsl.values[4 * static_cast<size_t>(harmonics.luma_groups + g)];
-    const Group& first = groups[static_cast<size_t>(harmonics.luma_groups + g)];
-    const Group& second = groups[static_cast<size_t>(harmonics.luma_groups + harmonics.chroma_groups + g)];
-    const int low = harmonics.num_low();
-    values[0] = pack(first, 0, low, texel, 2, 16, 0);
-    values[1] = pack(second, 0, low, texel + 1, 2, 16, 0);
-    values[2] = pack(first, low, n, texel + 2 * low, 1, 8, 0);
-    values[3] = pack(second, low, n, texel + 2 * low, 1, 8, 2);
+    const int first = harmonics.luma_groups + g;
+    pack_pair(first, first + harmonics.chroma_groups, harmonics.luma_texels() + g * harmonics.pair_texels(),
+              harmonics.luma_values() + g);
   }
 }
 
