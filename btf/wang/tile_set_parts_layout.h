@@ -25,7 +25,7 @@ inline constexpr char kTileSetPartKind[] = "tile_set_part";
 inline constexpr char kPixelLabels[] = "source_pixels";
 inline constexpr char kBtfelLabels[] = "btfels";
 // Transforms take time with the cube of it.
-inline constexpr int kMostBlockSide = 512;
+inline constexpr int kMostBlockSide = 128;
 inline constexpr int kMostLevel = 12;
 
 // A section with one extent; none where there are no values.

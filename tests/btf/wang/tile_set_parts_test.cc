@@ -304,7 +304,7 @@ TEST(TileSetPartsTest, DamagedLayersAreRefused) {
         codes.shape[0] += 4;
       },
       "section 'codes': the numbers end");
-  begin_fails([](Container& c) { c.header["block_side"] = 513; }, "block_side");
+  begin_fails([](Container& c) { c.header["block_side"] = 129; }, "block_side");
   begin_fails([](Container& c) { c.header["block_side"] = 0; }, "block_side");
   begin_fails([](Container& c) { c.header.erase("block_side"); }, "block_side");
   begin_fails([](Container& c) { c.header["level"] = 13; }, "level");
