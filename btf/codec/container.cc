@@ -56,6 +56,13 @@ absl::StatusOr<const Section*> RequireSection(const Container& container, std::s
   return section;
 }
 
+absl::Status RequireKind(const Container& container, std::string_view kind) {
+  return container.kind == kind
+             ? absl::OkStatus()
+             : absl::InvalidArgumentError(absl::StrCat("container kind '", container.kind, "', expected '",
+                                                       absl::string_view(kind.data(), kind.size()), "'"));
+}
+
 absl::StatusOr<std::string> HeaderString(const nlohmann::json& header, std::string_view key) {
   const auto it = header.find(std::string(key));
   if (it == header.end()) {

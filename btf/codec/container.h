@@ -149,6 +149,9 @@ template <typename T>
   return values;
 }
 
+// Errors: INVALID_ARGUMENT naming the kind and the one expected.
+[[nodiscard]] absl::Status RequireKind(const Container& container, std::string_view kind);
+
 // header[key] as a string, "" when absent. Errors: INVALID_ARGUMENT when it is something else.
 [[nodiscard]] absl::StatusOr<std::string> HeaderString(const nlohmann::json& header, std::string_view key);
 

@@ -36,10 +36,7 @@ absl::StatusOr<std::string> SerializeMaterial(const Material& material) {
 
 absl::StatusOr<Material> ParseMaterial(std::span<const std::byte> bytes) {
   TESSERA_ASSIGN_OR_RETURN(Container container, ParseContainer(bytes));
-  if (container.kind != kMaterialKind) {
-    return absl::InvalidArgumentError(
-        absl::StrCat("container kind '", container.kind, "', expected '", kMaterialKind, "'"));
-  }
+  TESSERA_RETURN_IF_ERROR(RequireKind(container, kMaterialKind));
   Material material;
   TESSERA_ASSIGN_OR_RETURN(material.btfels, ReadSharedTables(container));
   TESSERA_ASSIGN_OR_RETURN(const std::vector<int64_t> extents,

@@ -15,7 +15,7 @@ namespace {
 // In reflectance: what the rounding of the bases costs, and what base vectors that are left out have.
 constexpr double kBasisRmse = 0.001;
 constexpr double kLargestBasisStep = 1.0 / 32.0;
-constexpr double kCoreDeadZone = 0.1;
+constexpr double kDeadZone = 0.1;
 constexpr double kRidge = 1e-9;
 
 // The eigenvectors of a sum of squares, most of it first, rounded. `entries`: numbers of a matrix.
@@ -52,6 +52,10 @@ Eigen::MatrixXd InverseOf(const Eigen::MatrixXf& basis) {
 }
 
 }  // namespace
+
+int32_t CodeOf(double value, double step) {
+  return static_cast<int32_t>(std::copysign(std::floor(std::abs(value) / step + 0.5 - kDeadZone), value));
+}
 
 absl::StatusOr<CoreCoder> CoreCoder::Create(const BtfelTable& table, std::vector<AngularTable> tables,
                                             const std::vector<double>& costs) {
@@ -101,10 +105,8 @@ std::vector<int32_t> CoreCoder::Finer(float step) {
   std::vector<int32_t> codes;
   size_t end = 0;
   for (size_t i = 0; i < wanted_.size(); ++i) {
-    const double left = wanted_[i] - sum_.cores()[i];
-    const double size = std::floor(std::abs(left) / step + 0.5 - kCoreDeadZone);
-    codes.push_back(static_cast<int32_t>(std::copysign(size, left)));
-    end = size > 0.0 ? i + 1 : end;
+    codes.push_back(CodeOf(static_cast<double>(wanted_[i]) - sum_.cores()[i], step));
+    end = codes.back() != 0 ? i + 1 : end;
   }
   codes.resize(end);
   (void)sum_.Add(step, codes);  // a step above 0, and no more codes than there are

@@ -17,6 +17,10 @@
 
 namespace tessera {
 
+// The whole number of steps nearest to a value, but 0 up to a tenth of a step beyond one half: small codes
+// cost more than they save.
+[[nodiscard]] int32_t CodeOf(double value, double step);
+
 class CoreCoder {
  public:
   // `costs` [matrices]: the RMSE in reflectance that one step of a matrix's numbers makes. Errors: CoreSum's.

@@ -23,7 +23,7 @@
 namespace tessera {
 namespace {
 
-// Patches are about as wide as half a strip, and cells much smaller.
+// Patches go with the strip's height, and cells are to be smaller.
 constexpr int kCellsPerStrip = 4;
 constexpr size_t kErrorTexels = 256;
 constexpr size_t kErrorPairs = 8;

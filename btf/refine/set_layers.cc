@@ -34,8 +34,6 @@ constexpr int kBlocks = 6;
 constexpr Eigen::Index kBlockComponents = kMostComponents / kBlocks;
 // Components and tables are as exact as images of this step, so that later layers need not mend them.
 constexpr float kSharedStep = 1.0F / 1024.0F;
-// Codes are 0 up to this many steps more than one half: small ones cost more than they save.
-constexpr double kDeadZone = 0.1;
 // Squared error that a byte of images saves, in squares of the step: twice ln 2 a bit, of step^2 / 12.
 constexpr double kSquaresPerByte = 0.92;
 constexpr double kBytesPerBasisCode = 0.6;
@@ -43,7 +41,9 @@ constexpr double kBytesPerComponent = 16.0;
 // An error that is the same all over the tiles changes their colour, and is seen so many times better than
 // what differs from texel to texel.
 constexpr double kMeanWeight = 4.0;
+// Finer cores would be lost among kLayersEndRmse.
 constexpr float kLeastCoreStep = 0.0005F;
+// Whole numbers of a table: few, but more than rounding hides.
 constexpr float kTrial = 8.0F;
 constexpr size_t kRows = 1024;
 // Few enough blocks that smooth images need few cosines, and small enough ones for their transform to be
@@ -232,13 +232,8 @@ class LayerCoder {
 
   absl::Status Measure() {
     TESSERA_ASSIGN_OR_RETURN(const std::unique_ptr<Decoder> decoder, MakeDecoder(table_));
-    TESSERA_ASSIGN_OR_RETURN(tables_, CoefficientTables::Of(table_));
     weights_ = MakeSceneCases(*decoder, table_, options_.light, kLightsPerView).weights;
     error_weights_ = MakeSceneCases(*decoder, table_, options_.light).weights;
-    held_.assign(static_cast<size_t>(table_.num_coefficients), false);
-    for (const uint32_t coefficient : options_.exact) {
-      held_[coefficient] = true;
-    }
     values_ = CoefficientsOf(table_, samples_.btfels, samples_.per_row);
     whole_ = values_ * error_weights_.transpose();
     layers_.block_side = blocks_.side;
@@ -246,8 +241,12 @@ class LayerCoder {
     if (options_.exact.empty()) {
       TESSERA_RETURN_IF_ERROR(MakeCores());
     }
-    for (uint32_t c = 0; c < held_.size(); ++c) {
-      if (!held_[c]) {
+    std::vector<bool> is_exact(static_cast<size_t>(table_.num_coefficients), false);
+    for (const uint32_t coefficient : options_.exact) {
+      is_exact[coefficient] = true;
+    }
+    for (uint32_t c = 0; c < is_exact.size(); ++c) {
+      if (!is_exact[c]) {
         layers_.coefficients.push_back(c);
       }
     }
@@ -265,7 +264,8 @@ class LayerCoder {
   // Tables by views and lights, each matrix by what an error in it costs: how far weights move where every
   // number of the tables moves by kTrial.
   absl::Status MakeCores() {
-    std::vector<AngularTable> angular = AngularTablesOf(table_, *tables_);
+    TESSERA_ASSIGN_OR_RETURN(const CoefficientTables tables, CoefficientTables::Of(table_));
+    std::vector<AngularTable> angular = AngularTablesOf(table_, tables);
     if (angular.empty()) {
       return absl::OkStatus();
     }
@@ -290,9 +290,9 @@ class LayerCoder {
       const size_t first = squares.size();
       squares.resize(first + each.num_matrices(), 0.0);
       const size_t angles = table_.views.size() * table_.lights.size();
-      for (uint32_t c = 0; c < held_.size(); ++c) {
+      for (uint32_t c = 0; std::cmp_less(c, table_.num_coefficients); ++c) {
         std::set<size_t> matrices;
-        for (const int64_t entry : tables_->EntriesOf(each.name, std::span(&c, 1), {})) {
+        for (const int64_t entry : tables.EntriesOf(each.name, std::span(&c, 1), {})) {
           const size_t cell = static_cast<size_t>(entry) / each.after_count;
           matrices.insert(cell / angles * each.after_count + static_cast<size_t>(entry) % each.after_count);
         }
@@ -378,8 +378,7 @@ class LayerCoder {
     for (size_t i = 0; i < wanted.size(); ++i) {
       const double unit = step * factors_[i / blocks_.size()];
       const double left = wanted[i] - (held.empty() ? 0.0F : held[i]);
-      const double size = std::floor(std::abs(left) / unit + 0.5 - kDeadZone);
-      codes[i] = static_cast<int32_t>(std::copysign(size, left));
+      codes[i] = CodeOf(left, unit);
       saved += left * left - (left - codes[i] * unit) * (left - codes[i] * unit);
     }
     return {std::move(codes), saved};
@@ -415,12 +414,14 @@ class LayerCoder {
     }
     TESSERA_RETURN_IF_ERROR(sum.Add(layer));
     std::optional<CoreCoder> cores = cores_;
+    FloatRows error_weights = error_weights_;
     if (cores.has_value() && brings == Brings::kComponents) {
       TESSERA_RETURN_IF_ERROR(AddCores(step, layer));
     }
     const double rmse = RmseOf(ReflectedBy(sum), whole_);
     if (rmse >= rmse_) {
       cores_ = std::move(cores);
+      error_weights_ = std::move(error_weights);
       return absl::OkStatus();
     }
     taken_ = std::move(taken);
@@ -448,12 +449,10 @@ class LayerCoder {
   Gaps gaps_;
   std::vector<float> factors_;  // [frequency]
   BlockCosines transform_;
-  std::optional<CoefficientTables> tables_;
   FloatRows weights_;        // [3 * cases][k], over the root of their number
   FloatRows error_weights_;  // of the cases over which errors are measured, as they are
   FloatRows values_;         // [sampled][k], less the mean
   FloatRows whole_;          // [sampled][3 * cases], what they reflect
-  std::vector<bool> held_;   // [k], exact
   std::optional<CoreCoder> cores_;
   std::vector<Candidate> candidates_;
   std::vector<size_t> taken_;  // [component], the candidate that it is

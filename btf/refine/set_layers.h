@@ -27,8 +27,7 @@ namespace tessera {
 
 // Components at most.
 inline constexpr int kMostComponents = 192;
-// Layers end when the error is at most this, one step of a picture of 8 bits, or when finer ones would take
-// more bytes than the coefficients themselves.
+// Layers end when the error is at most this, one step of a picture of 8 bits, or with a step of 1/16384.
 inline constexpr double kLayersEndRmse = 0.004;
 
 struct SetLayersOptions {

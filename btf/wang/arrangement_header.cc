@@ -82,10 +82,7 @@ absl::StatusOr<int> ReadInteger(const nlohmann::json& header, std::string_view k
 
 absl::StatusOr<Container> ParseContainerOfKind(std::span<const std::byte> bytes, std::string_view kind) {
   TESSERA_ASSIGN_OR_RETURN(Container container, ParseContainer(bytes));
-  if (container.kind != kind) {
-    return absl::InvalidArgumentError(
-        absl::StrCat("container kind '", container.kind, "', expected '", std::string(kind), "'"));
-  }
+  TESSERA_RETURN_IF_ERROR(RequireKind(container, kind));
   return container;
 }
 

@@ -98,10 +98,7 @@ absl::StatusOr<CodecTable> EmptyTable(const std::string& name, const nlohmann::j
 
 absl::StatusOr<Container> ParsePart(std::span<const std::byte> bytes) {
   TESSERA_ASSIGN_OR_RETURN(Container container, ParseFrame(bytes));
-  if (container.kind != kTileSetPartKind) {
-    return absl::InvalidArgumentError(
-        absl::StrCat("container kind '", container.kind, "', expected '", kTileSetPartKind, "'"));
-  }
+  TESSERA_RETURN_IF_ERROR(RequireKind(container, kTileSetPartKind));
   return container;
 }
 

@@ -126,8 +126,8 @@ class PatchTile {
 
 // What says of which patch a texel is.
 struct PatchContexts {
-  // Whether it is a neighbour's; of those, whether not the first, not the second, ..
-  std::array<std::array<AdaptiveBit, kMostNeighbours + 1>, 128> neighbour;
+  // Whether it is not the first of the neighbours' patches, not the second, ..
+  std::array<std::array<AdaptiveBit, kMostNeighbours>, 128> neighbour;
   AdaptiveBit is_new;
   AdaptiveNumber rank;
   std::array<AdaptiveBit, kTexelBits> texel;  // of a new patch, from the highest bit

@@ -21,7 +21,7 @@
 namespace tessera {
 
 inline constexpr char kTileSetPartKind[] = "tile_set_part";
-// Header `labels`: what the texels of `tile_index` name, pixels of the exemplar or BTFels of the whole set.
+// Header `labels`: what texels name, pixels of the exemplar or BTFels of the whole set.
 inline constexpr char kPixelLabels[] = "source_pixels";
 inline constexpr char kBtfelLabels[] = "btfels";
 // Transforms take time with the cube of it.

@@ -47,7 +47,7 @@ uint64_t SizeOf(const TileSetCut& cut) {
   uint64_t bytes = 0;
   if (cut.layers != nullptr) {
     for (const TileSetLayer& layer : cut.layers->layers) {
-      bytes += sizeof(int32_t) * (layer.codes.size() + layer.basis.size());
+      bytes += sizeof(int32_t) * (layer.codes.size() + layer.basis.size() + layer.cores.size());
     }
   }
   return bytes;
