@@ -18,6 +18,7 @@
 #include "btf/tiles/certificate.h"
 #include "btf/tiles/index_maps.h"
 #include "btf/tiles/repetition.h"
+#include "btf/tiles/seam_embedding.h"
 #include "btf/tiles/seam_graph.h"
 
 namespace tessera {
@@ -132,10 +133,12 @@ std::vector<int> Middle(int side, int most) {
 
 class SynthesisRun {
  public:
-  SynthesisRun(const Material& material, const Embedding& embedding, const RunContext& context,
-               SynthesisChart& chart)
+  // `embedding` is the codec's, `for_seams` what our method lays tiles in.
+  SynthesisRun(const Material& material, const Embedding& embedding, const Embedding& for_seams,
+               const RunContext& context, SynthesisChart& chart)
       : material_(material),
         embedding_(embedding),
+        for_seams_(for_seams),
         judge_(embedding),
         full_(embedding, SeamRule::kMismatch, embedding.dims),
         arrangement_(**FindArrangement(kArrangement)),
@@ -191,7 +194,8 @@ class SynthesisRun {
     params.force = true;
     (IsDiamond(point.method) ? params.diamonds.num_draws : params.num_candidates) = setting.candidates;
     const auto start = std::chrono::steady_clock::now();
-    const Exemplar exemplar(embedding_, params.seam_rule, setting.dims);
+    const Embedding& laid_in = params.seam_rule == SeamRule::kExcess ? for_seams_ : embedding_;
+    const Exemplar exemplar(laid_in, params.seam_rule, setting.dims);
     TESSERA_ASSIGN_OR_RETURN(const IndexMaps maps,
                              SynthesizeIndexMaps(exemplar, arrangement_, params, quiet_));
     point.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
@@ -225,6 +229,7 @@ class SynthesisRun {
 
   const Material& material_;
   const Embedding& embedding_;
+  const Embedding& for_seams_;
   Exemplar judge_;  // the same for every point
   Exemplar full_;
   const Arrangement& arrangement_;
@@ -261,6 +266,7 @@ absl::StatusOr<SynthesisChart> ChartSynthesis(const std::string& name, BtfSource
   const auto start = std::chrono::steady_clock::now();
   TESSERA_ASSIGN_OR_RETURN(const Embedding embedding,
                            FindCodec(kChartedCodec)->Embed(material, kMostDims, context));
+  TESSERA_ASSIGN_OR_RETURN(const Embedding for_seams, EmbedForSeams(material, kMostDims, context));
   SynthesisChart chart{.name = name,
                        .width = material.width,
                        .height = material.height,
@@ -273,7 +279,7 @@ absl::StatusOr<SynthesisChart> ChartSynthesis(const std::string& name, BtfSource
     captured += variance;
     chart.captured.push_back(embedding.total_variance > 0.0 ? captured / embedding.total_variance : 1.0);
   }
-  TESSERA_RETURN_IF_ERROR(SynthesisRun(material, embedding, context, chart).Run());
+  TESSERA_RETURN_IF_ERROR(SynthesisRun(material, embedding, for_seams, context, chart).Run());
   return chart;
 }
 

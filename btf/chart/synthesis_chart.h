@@ -61,7 +61,8 @@ struct SynthesisPoint {
   double repetition = 0.0;
   double referenced_share = 0.0;
   // Mean mismatch of a seam's two patches, both its texels, in units of the root mean square distance of two
-  // texels drawn at random: in the dimensions that the cuts saw, and in all that the embedding has. Insides.
+  // texels drawn at random, in the codec's embedding: in as many dimensions as the cuts saw of theirs, and in
+  // all. Insides.
   double seen_error = 0.0;
   double full_error = 0.0;
 
@@ -75,7 +76,7 @@ struct SynthesisChart {
   int tile_size = 0;
   ChartSize size = ChartSize::kFull;
   int embedding_dims = 0;
-  double embed_s = 0.0;  // wall clock, once for all points
+  double embed_s = 0.0;  // wall clock of both embeddings, once for all points
   // Share of the embedding's variance in the first 1, 2, .. dimensions.
   std::vector<double> captured;
   std::vector<SynthesisPoint> points;

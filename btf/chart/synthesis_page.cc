@@ -248,7 +248,7 @@ absl::StatusOr<std::string> SheetsHtml(const SynthesisChart& chart) {
 
 std::string SynthesisFacts(const SynthesisChart& chart) {
   std::string text =
-      absl::StrFormat("%dx%d texels, tiles of %dx%d in plane-16; embedded in %.2f s; ", chart.width,
+      absl::StrFormat("%dx%d texels, tiles of %dx%d in plane-16; both embeddings in %.2f s; ", chart.width,
                       chart.height, chart.tile_size, chart.tile_size, chart.embed_s);
   text += "share of the variance in the first layers:";
   for (size_t dims = 1; dims <= chart.captured.size(); dims *= 2) {
@@ -303,13 +303,15 @@ constexpr char kSynthesisRules[] = R"(<h2>How it was measured</h2>
 <li><b>diamond-dp, diamond-cut</b>: one sample for every edge colour; a tile joins four halves along its diagonals, by the
 cheapest path that never turns back or by a minimum cut, through an overlap as wide as the strip height. Sets of samples are drawn
 at random until d is below d_max, here half the mean squared distance of two texels; of the rest the best.</li>
-<li><b>frame, mismatch</b>: the paper's method, and its price of a seam. <b>frame, excess</b>: ours, the same with the price that
-counts only what a seam adds to the material's own steps.</li>
+<li><b>frame, mismatch</b>: the paper's method, and its price of a seam. <b>frame, excess</b>: ours, with the price that counts only
+what a seam adds to the material's own steps, and an embedding of its own: of pictures from the measured directions, each divided by
+its mean step, most of them from grazing views.</li>
 <li><b>R</b>: the certificate, 256 images spread over views and lights; steps along seams over the material's own there, 1 where a
 cut cannot be told from the material. It is a mean over cut pairs: how many there are stands in the table as cut share. Borders of
 diamonds are pieces of the exemplar, so that only their ends can have seams.</li>
 <li><b>Mismatch of seams</b>: half the sum of |a - b'| and |a' - b| within tiles, over the root mean square distance of two texels
-drawn at random, in the same dimensions. Layers are the principal components of the SH coefficients, the largest first.</li>
+drawn at random, in the same dimensions. Layers are the principal components of the SH coefficients, the largest first; ours is
+judged in as many of them as it takes of its own.</li>
 <li><b>Time</b>: wall clock from the embedding to the tiles, spectra of the exemplar included, the certificate not.</li>
 <li>One parameter varies, the others stay: 32 layers, 256 draws at most or 16 patches. Points are means over the seeds that the
 table has for them: up to three for the common setting and for the layers of diamonds, which depend on a few samples.</li>

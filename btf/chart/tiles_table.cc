@@ -13,6 +13,7 @@
 #include "btf/report/page.h"
 #include "btf/tiles/certificate.h"
 #include "btf/tiles/index_maps.h"
+#include "btf/tiles/seam_embedding.h"
 
 namespace tessera {
 namespace {
@@ -82,19 +83,21 @@ absl::StatusOr<TilesRun> RunRow(const TilesRow& row, const RunContext& context) 
                            codec.Encode(*source, {.kl = row.k, .kv = row.k}, context));
   TilesRun run;
   auto start = std::chrono::steady_clock::now();
-  TESSERA_ASSIGN_OR_RETURN(const Embedding embedding, codec.Embed(material, kCutDims, context));
+  TESSERA_ASSIGN_OR_RETURN(const Embedding laid_in, EmbedForSeams(material, kCutDims, context));
   run.embed_s = SecondsSince(start);
   const SynthesisParams params{.tile_size = row.tile_size, .force = true};
   const Arrangement& arrangement = **FindArrangement(kTilesArrangement);
   start = std::chrono::steady_clock::now();
-  const Exemplar exemplar(embedding, params.seam_rule);
-  TESSERA_ASSIGN_OR_RETURN(const IndexMaps maps, SynthesizeIndexMaps(exemplar, arrangement, params, context));
+  TESSERA_ASSIGN_OR_RETURN(const IndexMaps maps, SynthesizeIndexMaps(Exemplar(laid_in, params.seam_rule),
+                                                                     arrangement, params, context));
   run.seconds = SecondsSince(start);
   const TileSet tiles = TileSetOfMaps(material, arrangement, maps, params);
-  run.referenced_share = static_cast<double>(tiles.btfels.size()) / exemplar.num_pixels();
+  run.referenced_share =
+      static_cast<double>(tiles.btfels.size()) / static_cast<double>(material.btfels.size());
   run.btfel_bytes = tiles.btfels.size() * tiles.btfels.num_coefficients;
+  TESSERA_ASSIGN_OR_RETURN(const Embedding embedding, codec.Embed(material, kCutDims, context));
   TESSERA_ASSIGN_OR_RETURN(const Certificate certificate,
-                           CertifyTiles(material, exemplar, arrangement, maps, params.strip_height,
+                           CertifyTiles(material, Exemplar(embedding), arrangement, maps, params.strip_height,
                                         CertificateImages::kStratified, context));
   run.insides_ratio = certificate.figures["insides"]["ratio"].get<double>();
   return run;

@@ -19,16 +19,14 @@ namespace {
 
 constexpr int kPolarAngles = 3;
 constexpr int kAzimuths = 8;
-constexpr int kDirections = kPolarAngles * kAzimuths;
-constexpr int kPairs = kDirections * kDirections;
-constexpr int64_t kPairsPerTask = 16;
+constexpr int64_t kImagesPerTask = 16;
 
 struct Node {
   Eigen::Vector3d direction;
   double weight = 0.0;  // steradians
 };
 
-// Node 4 i + t is node 4 i as a texel turned t times sees it, to the last bit.
+// Node 4 i + t is node 4 i as a texel turned t times sees it.
 std::vector<Node> MakeNodes() {
   const GaussLegendreRule polar = GaussLegendre(kPolarAngles);
   std::vector<Node> nodes;
@@ -44,15 +42,13 @@ std::vector<Node> MakeNodes() {
   return nodes;
 }
 
-FeatureTurns MakeTurns() {
+// Of images of which number 4 i + t is number 4 i as a texel turned t times sees it.
+FeatureTurns TurnsOfImages(int num_images) {
   std::array<std::vector<int>, kQuarterTurns> source;
   std::array<std::vector<double>, kQuarterTurns> sign;
   for (int turns = 0; turns < kQuarterTurns; ++turns) {
-    const auto turned = [turns](int node) {
-      return node / kQuarterTurns * kQuarterTurns + (node + turns) % kQuarterTurns;
-    };
-    for (int pair = 0; pair < kPairs; ++pair) {
-      const int from = turned(pair / kDirections) * kDirections + turned(pair % kDirections);
+    for (int image = 0; image < num_images; ++image) {
+      const int from = image / kQuarterTurns * kQuarterTurns + (image + turns) % kQuarterTurns;
       for (int channel = 0; channel < 3; ++channel) {
         source[turns].push_back(3 * from + channel);
         sign[turns].push_back(1.0);
@@ -62,11 +58,21 @@ FeatureTurns MakeTurns() {
   return {std::move(source), std::move(sign)};
 }
 
-// Feature 3 pair + channel is the decoded value times the root of the pair's solid angles.
+// Feature 3 image + channel is the decoded value times the image's weight.
 class DecodedFeatures final : public TexelFeatures {
  public:
-  DecodedFeatures(const BtfelTable& table, const Decoder& decoder)
-      : table_(table), decoder_(decoder), nodes_(MakeNodes()), turns_(MakeTurns()) {}
+  // Each of `images` in all four turns.
+  DecodedFeatures(const BtfelTable& table, const Decoder& decoder, const std::vector<WeightedImage>& images)
+      : table_(table),
+        decoder_(decoder),
+        turns_(TurnsOfImages(kQuarterTurns * static_cast<int>(images.size()))) {
+    for (const WeightedImage& image : images) {
+      for (int turns = 0; turns < kQuarterTurns; ++turns) {
+        images_.push_back(
+            {UnturnedFromTurned(image.light, turns), UnturnedFromTurned(image.view, turns), image.weight});
+      }
+    }
+  }
 
   [[nodiscard]] const FeatureTurns& turns() const override { return turns_; }
 
@@ -75,38 +81,38 @@ class DecodedFeatures final : public TexelFeatures {
     const int64_t num_texels = end - begin;
     const size_t k = static_cast<size_t>(table_.num_coefficients);
     const std::span<const uint8_t> codes = std::span(table_.codes).subspan(begin * k, num_texels * k);
-    ParallelFor(context, 0, kPairs, kPairsPerTask, [&](int64_t first, int64_t last) {
-      std::vector<float> rgb(static_cast<size_t>(3 * num_texels * (last - first)));
-      for (int64_t p = first; p < last; ++p) {
-        const std::span<float> values = std::span(rgb).subspan((p - first) * 3 * num_texels, 3 * num_texels);
-        const Node& light = nodes_[p / kDirections];
-        const Node& view = nodes_[p % kDirections];
-        decoder_.DecodeTexels(codes, light.direction, view.direction, /*turns=*/0, values);
-        const float root =
-            static_cast<float>(std::sqrt(light.weight * view.weight / 3.0));  // the mean over channels
-        for (float& value : values) {
-          value *= root;
-        }
-      }
-      for (int64_t n = 0; n < num_texels; ++n) {
-        for (int64_t p = first; p < last; ++p) {
-          features.col(n).segment<3>(3 * p) =
-              Eigen::Map<const Eigen::Vector3f>(rgb.data() + 3 * ((p - first) * num_texels + n));
-        }
-      }
-    });
+    ParallelFor(context, 0, static_cast<int64_t>(images_.size()), kImagesPerTask,
+                [&](int64_t first, int64_t last) {
+                  std::vector<float> rgb(static_cast<size_t>(3 * num_texels * (last - first)));
+                  for (int64_t i = first; i < last; ++i) {
+                    const std::span<float> values =
+                        std::span(rgb).subspan((i - first) * 3 * num_texels, 3 * num_texels);
+                    const WeightedImage& image = images_[i];
+                    decoder_.DecodeTexels(codes, image.light, image.view, /*turns=*/0, values);
+                    for (float& value : values) {
+                      value *= static_cast<float>(image.weight);
+                    }
+                  }
+                  for (int64_t n = 0; n < num_texels; ++n) {
+                    for (int64_t i = first; i < last; ++i) {
+                      features.col(n).segment<3>(3 * i) =
+                          Eigen::Map<const Eigen::Vector3f>(rgb.data() + 3 * ((i - first) * num_texels + n));
+                    }
+                  }
+                });
   }
 
  private:
   const BtfelTable& table_;
   const Decoder& decoder_;
-  std::vector<Node> nodes_;
+  std::vector<WeightedImage> images_;
   FeatureTurns turns_;
 };
 
 }  // namespace
 
-absl::StatusOr<Embedding> EmbedDecoded(const Material& material, int dims, const RunContext& context) {
+absl::StatusOr<Embedding> EmbedImages(const Material& material, const std::vector<WeightedImage>& images,
+                                      int dims, const RunContext& context) {
   const BtfelTable& table = material.btfels;
   TESSERA_ASSIGN_OR_RETURN(const std::unique_ptr<Decoder> decoder, MakeDecoder(table));
   if (material.width < 1 || material.height < 1 ||
@@ -116,7 +122,20 @@ absl::StatusOr<Embedding> EmbedDecoded(const Material& material, int dims, const
                                                    " x ", material.width, " x ",
                                                    decoder->num_coefficients()));
   }
-  return EmbedFeatures(material.width, material.height, DecodedFeatures(table, *decoder), dims, context);
+  return EmbedFeatures(material.width, material.height, DecodedFeatures(table, *decoder, images), dims,
+                       context);
+}
+
+absl::StatusOr<Embedding> EmbedDecoded(const Material& material, int dims, const RunContext& context) {
+  const std::vector<Node> nodes = MakeNodes();
+  std::vector<WeightedImage> images;
+  for (const Node& light : nodes) {
+    for (size_t view = 0; view < nodes.size(); view += kQuarterTurns) {
+      images.push_back({light.direction, nodes[view].direction,
+                        std::sqrt(light.weight * nodes[view].weight / 3.0)});  // the mean over channels
+    }
+  }
+  return EmbedImages(material, images, dims, context);
 }
 
 }  // namespace tessera

@@ -9,12 +9,29 @@
 // how far a fit swings below 0 says nothing about the material.
 #pragma once
 
+#include <vector>
+
 #include <absl/status/statusor.h>
+#include <Eigen/Core>
 
 #include "btf/base/run_context.h"
 #include "btf/codec/codec.h"
 
 namespace tessera {
+
+// A light and a view, unit vectors above the horizon, and how much what is seen there counts.
+struct WeightedImage {
+  Eigen::Vector3d light;
+  Eigen::Vector3d view;
+  double weight = 1.0;  // of values; of squared differences it is squared
+};
+
+// The embedding in which squared distance is the sum over `images`, each in all four quarter turns, of the
+// squared difference of decoded RGB times the weight. result.dims = min(dims, 12 images); decodes every texel
+// under all of them, twice; memory and errors as below.
+[[nodiscard]] absl::StatusOr<Embedding> EmbedImages(const Material& material,
+                                                    const std::vector<WeightedImage>& images, int dims,
+                                                    const RunContext& context);
 
 // As Codec::Embed; result.dims = min(dims, 1728). Deterministic for any number of threads. Decodes every
 // texel under 576 pairs, twice. Memory besides the result: about 80 MiB, whatever the material. Errors:

@@ -4,7 +4,6 @@
 #include <array>
 #include <cmath>
 #include <cstdlib>
-#include <limits>
 
 #include "btf/base/parallel.h"
 #include "btf/base/rng.h"
@@ -14,7 +13,7 @@
 namespace tessera {
 namespace {
 
-constexpr int kStarts = 8;             // random starts
+constexpr int kStarts = 16;            // random starts
 constexpr int kSweeps = 4;             // over all samples; the last is greedy
 constexpr int kCornerCandidates = 80;  // cut for each sample and sweep
 // What a set of samples costs: the mean mismatch of its cuts in mean steps, plus these prices, each on
@@ -28,8 +27,8 @@ constexpr double kNearnessPrice = 6.0;
 constexpr double kMeanPrice = 0.2;
 constexpr double kVariancePrice = 0.3;
 // Of the vertex texel against the one across the border, beside the pairs of the cut: most borders have no
-// other seams than at their ends.
-constexpr int kVertexWeight = 2;
+// other seams than at their ends, so all that shows of a border is there.
+constexpr int kVertexWeight = 16;
 constexpr double kTemperature = 0.02;  // of the draw, in mean steps
 constexpr int kTypicalDraws = 256;     // random samples that tell what is typical
 
@@ -204,7 +203,7 @@ class CornerSearch {
   [[nodiscard]] int num_samples() const { return static_cast<int>(samples_.size()); }
 
   [[nodiscard]] Corners Result() {
-    Corners corners{.strip_height = strip_height_, .samples = samples_, .cuts = {}};
+    Corners corners{.strip_height = strip_height_, .samples = samples_, .cuts = {}, .cost = TotalCost()};
     for (const CornerPair& pair : pairs_) {
       corners.cuts.push_back(CutPair(exemplar_, samples_, pair, strip_height_, grid_, scratch_));
     }
@@ -373,11 +372,11 @@ const CornerCut& Corners::cut(const CornerPair& pair) const {
   return *std::find_if(cuts.begin(), cuts.end(), [&](const CornerCut& cut) { return cut.pair == pair; });
 }
 
-absl::StatusOr<Corners> ChooseCorners(const ExemplarSpectra& spectra, const Arrangement& arrangement,
-                                      int strip_height, uint64_t seed, const RunContext& context,
-                                      const std::vector<std::optional<Patch>>& by_hand) {
-  std::vector<Corners> results(kStarts);
-  std::vector<double> costs(kStarts, std::numeric_limits<double>::infinity());
+absl::StatusOr<std::vector<Corners>> ChooseCorners(const ExemplarSpectra& spectra,
+                                                   const Arrangement& arrangement, int strip_height,
+                                                   uint64_t seed, const RunContext& context,
+                                                   const std::vector<std::optional<Patch>>& by_hand) {
+  std::vector<Corners> sets(kStarts);
   ParallelFor(context, 0, kStarts, 1, [&](int64_t start, int64_t) {
     CornerSearch search(spectra, arrangement, strip_height, Mix64(seed, static_cast<uint64_t>(start)),
                         by_hand);
@@ -389,12 +388,12 @@ absl::StatusOr<Corners> ChooseCorners(const ExemplarSpectra& spectra, const Arra
         search.Improve(sample, sweep == kSweeps - 1, context.stop);
       }
     }
-    costs[start] = search.TotalCost();
-    results[start] = search.Result();
+    sets[start] = search.Result();
   });
   TESSERA_RETURN_IF_ERROR(context.CheckStop());
-  const auto best = std::min_element(costs.begin(), costs.end()) - costs.begin();
-  return std::move(results[best]);
+  std::stable_sort(sets.begin(), sets.end(),
+                   [](const Corners& a, const Corners& b) { return a.cost < b.cost; });
+  return sets;
 }
 
 }  // namespace tessera

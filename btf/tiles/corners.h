@@ -28,7 +28,7 @@ namespace tessera {
 struct CornerCut {
   CornerPair pair;
   std::vector<uint8_t> in_wins;  // [j][i], h/2 x h/2
-  // In the units of PairCost: of the cut, and twice that of the vertex texel against the one across
+  // In the units of PairCost: of the cut, and sixteen times that of the vertex texel against the one across
   // side `in`.
   int64_t cost = 0;
 };
@@ -38,6 +38,9 @@ struct Corners {
   // By 2 * strip + end: where the sample lies, h/2 wide and h high, in the strip's own frame.
   std::vector<Patch> samples;
   std::vector<CornerCut> cuts;
+  // The mean mismatch of the cuts, a texel of their shortest course, in mean steps, and what it costs that
+  // samples overlap or stand out.
+  double cost = 0.0;
 
   [[nodiscard]] const Patch& sample(int strip, StripEnd end) const {
     return samples[static_cast<size_t>(2 * strip) + static_cast<size_t>(end)];
@@ -45,12 +48,14 @@ struct Corners {
   [[nodiscard]] const CornerCut& cut(const CornerPair& pair) const;
 };
 
-// Several random starts, each improved sample by sample: the best places for one sample against the mean of
-// all it meets come from a search, the choice among them from the true cuts, drawn at first and greedy at the
-// end. Samples less than a strip height apart in the exemplar pay dearly for it, so that not one patch serves
-// every corner. Samples given by hand stay where they are. Errors: CANCELLED.
-absl::StatusOr<Corners> ChooseCorners(const ExemplarSpectra& spectra, const Arrangement& arrangement,
-                                      int strip_height, uint64_t seed, const RunContext& context,
-                                      const std::vector<std::optional<Patch>>& by_hand = {});
+// Sets of samples, cheapest first, from several random starts, each improved sample by sample: the best
+// places for one sample against the mean of all it meets come from a search, the choice among them from the
+// true cuts, drawn at first and greedy at the end. Samples less than a strip height apart in the exemplar pay
+// dearly for it, so that not one patch serves every corner. Samples given by hand stay where they are.
+// Errors: CANCELLED.
+absl::StatusOr<std::vector<Corners>> ChooseCorners(const ExemplarSpectra& spectra,
+                                                   const Arrangement& arrangement, int strip_height,
+                                                   uint64_t seed, const RunContext& context,
+                                                   const std::vector<std::optional<Patch>>& by_hand = {});
 
 }  // namespace tessera

@@ -26,10 +26,12 @@ inline constexpr uint32_t kNoTexel = 0xffffffffu;
 inline constexpr int kSearchDims = 16;
 inline constexpr int kCutDims = 32;
 
-// What a seam costs, from the mismatch of its patches and their own steps there (seam_graph.h).
+// What a seam costs, from the mismatch of its patches and their own steps there (seam_graph.h), and the
+// embedding that SynthesizeTileSet lays tiles in.
 enum class SeamRule {
-  kMismatch,  // [Leung2007], [Kwatra2003]: the mismatch
-  kExcess     // what the seam's step exceeds those by: hidden where the material itself changes
+  kMismatch,  // [Leung2007], [Kwatra2003]: the mismatch; in the codec's embedding
+  // What the seam's step exceeds those by: hidden where the material itself changes; in seam_embedding.h.
+  kExcess
 };
 
 // `texel` seen after `turns` more quarter turns.

@@ -112,14 +112,28 @@ absl::StatusOr<IndexMaps> SynthesizeIndexMaps(const Exemplar& exemplar, const Ar
   TESSERA_RETURN_IF_ERROR(CheckExcluded(spectra, params));
 
   context.Report("corners", 0, 1, "sets");
-  TESSERA_ASSIGN_OR_RETURN(const Corners corners,
+  TESSERA_ASSIGN_OR_RETURN(const std::vector<Corners> corner_sets,
                            ChooseCorners(spectra, arrangement, params.strip_height,
                                          Mix64(params.seed, kCornerSeed), context, controls.corners));
   context.Report("corners", 1, 1, "sets");
 
+  const auto fill_params = [&](SeedStage stage) {
+    FillParams fill;
+    fill.feature_size = params.strip_height;
+    fill.seed = Mix64(params.seed, stage);
+    fill.mean_threshold = params.mean_threshold;
+    fill.texel_threshold = params.texel_threshold;
+    fill.num_candidates = params.num_candidates;
+    fill.effort = params.effort;
+    return fill;
+  };
+
+  TESSERA_ASSIGN_OR_RETURN(Edges edges, SynthesizeEdges(spectra, arrangement, corner_sets, controls, size,
+                                                        fill_params(kStripSeed), context));
+  const Corners& corners = edges.corners;
   IndexMaps maps{.tile_size = size,
                  .texels = std::vector<uint32_t>(tile_area * num_tiles, kNoTexel),
-                 .strips = std::vector<Strip>(num_strips),
+                 .strips = std::move(edges.strips),
                  .tile_reports = std::vector<FillReport>(num_tiles)};
   for (const CornerCut& cut : corners.cuts) {
     maps.corner_cost += cut.cost;
@@ -132,29 +146,7 @@ absl::StatusOr<IndexMaps> SynthesizeIndexMaps(const Exemplar& exemplar, const Ar
     const std::lock_guard lock(mutex);
     context.Report(stage, ++done, total, unit);
   };
-  const auto fill_params = [&](uint64_t stage, int item) {
-    FillParams fill;
-    fill.feature_size = params.strip_height;
-    fill.seed = Mix64(Mix64(params.seed, stage), static_cast<uint64_t>(item));
-    fill.mean_threshold = params.mean_threshold;
-    fill.texel_threshold = params.texel_threshold;
-    fill.num_candidates = params.num_candidates;
-    fill.effort = params.effort;
-    return fill;
-  };
-
-  std::vector<absl::Status> statuses(num_strips);
-  ParallelFor(context, 0, num_strips, 1, [&](int64_t begin, int64_t) {
-    const int strip = static_cast<int>(begin);
-    FillParams fill = fill_params(kStripSeed, strip);
-    fill.turns = TurnsOfStrip(arrangement, strip);
-    statuses[strip] = SynthesizeStrip(spectra, corners, controls.on_strip(strip), strip, size, fill, context,
-                                      maps.strips[strip]);
-    count_one("strips", "strips", num_strips);
-  });
-  TESSERA_RETURN_IF_ERROR(context.CheckStop());
   for (int strip = 0; strip < num_strips; ++strip) {
-    TESSERA_RETURN_IF_ERROR(statuses[strip]);
     TESSERA_RETURN_IF_ERROR(
         CheckReached(maps.strips[strip].report, params, absl::StrFormat("strip %d", strip)));
   }
@@ -169,14 +161,14 @@ absl::StatusOr<IndexMaps> SynthesizeIndexMaps(const Exemplar& exemplar, const Ar
   const int margin = params.strip_height / 2;
   const std::vector<int> turns_of_tiles = TurnsOfTiles(arrangement);
   const auto tile_params = [&](int tile, const Siblings& siblings) {
-    FillParams fill = fill_params(kTileSeed, tile);
+    FillParams fill = fill_params(kTileSeed);
+    fill.seed = Mix64(fill.seed, static_cast<uint64_t>(tile));
     fill.turns = TurnsOfInterior(arrangement);
     fill.usage = &usage;
     fill.siblings = &siblings;
     return fill;
   };
-  done = 0;
-  statuses.assign(num_tiles, absl::OkStatus());
+  std::vector<absl::Status> statuses(num_tiles);
   const auto first_tiles = [&](int count) {
     return std::span<const uint32_t>(maps.texels).first(count * tile_area);
   };

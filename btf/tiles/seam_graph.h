@@ -37,6 +37,10 @@ int PairCost(const Exemplar& exemplar, uint32_t a, uint32_t b, int direction);
 constexpr double MismatchOfCost(double cost) {
   return cost / (2.0 * kCostPerStep);
 }
+// The inverse.
+constexpr double CostOfMismatch(double mismatch) {
+  return mismatch * (2.0 * kCostPerStep);
+}
 
 class Canvas {
  public:

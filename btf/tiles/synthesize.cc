@@ -17,16 +17,24 @@
 #include "btf/tiles/features.h"
 #include "btf/tiles/index_maps.h"
 #include "btf/tiles/pattern.h"
+#include "btf/tiles/seam_embedding.h"
 
 namespace tessera {
 namespace {
 
-double CapturedShare(const Embedding& embedding, int dims) {
-  double captured = 0.0;
-  for (int dim = 0; dim < std::min<int>(dims, static_cast<int>(embedding.variance.size())); ++dim) {
-    captured += embedding.variance[dim];
-  }
-  return embedding.total_variance > 0.0 ? captured / embedding.total_variance : 1.0;
+// What the embedding that seams are laid in holds.
+nlohmann::json DescribeCaptured(const Embedding& embedding) {
+  const auto share = [&](int dims) {
+    double captured = 0.0;
+    for (int dim = 0; dim < std::min<int>(dims, static_cast<int>(embedding.variance.size())); ++dim) {
+      captured += embedding.variance[dim];
+    }
+    return embedding.total_variance > 0.0 ? captured / embedding.total_variance : 1.0;
+  };
+  return {{"search_dims", std::min(embedding.dims, kSearchDims)},
+          {"search_share", share(kSearchDims)},
+          {"cut_dims", std::min(embedding.dims, kCutDims)},
+          {"cut_share", share(kCutDims)}};
 }
 
 // The table of the BTFels that occur, in ascending exemplar order, and the index of each.
@@ -231,7 +239,7 @@ absl::StatusOr<TileSet> SynthesizeEmbedded(const Material& material, const Embed
                                            const std::vector<Feature>& features,
                                            const Arrangement& arrangement, const SynthesisParams& asked,
                                            const RunContext& context) {
-  const Exemplar exemplar(embedding, asked.seam_rule);
+  const Exemplar exemplar(embedding);
   TESSERA_ASSIGN_OR_RETURN(const MaterialPattern pattern, MeasurePattern(exemplar, context));
   if (arrangement.turned_strips && pattern.anisotropy > kAnisotropyLimit && !asked.force) {
     return WithReason(
@@ -248,8 +256,11 @@ absl::StatusOr<TileSet> SynthesizeEmbedded(const Material& material, const Embed
     TESSERA_ASSIGN_OR_RETURN(controls, MakeControls(*params.recipe, features, exemplar, arrangement,
                                                     params.tile_size, params.strip_height));
   }
-  TESSERA_ASSIGN_OR_RETURN(const IndexMaps maps,
-                           SynthesizeIndexMaps(exemplar, arrangement, params, context, controls));
+  TESSERA_ASSIGN_OR_RETURN(const Embedding laid_in, params.seam_rule == SeamRule::kExcess
+                                                        ? EmbedForSeams(material, kCutDims, context)
+                                                        : absl::StatusOr<Embedding>(embedding));
+  TESSERA_ASSIGN_OR_RETURN(const IndexMaps maps, SynthesizeIndexMaps(Exemplar(laid_in, params.seam_rule),
+                                                                     arrangement, params, context, controls));
 
   TileSet set = TileSetOfMaps(material, arrangement, maps, params);
   TESSERA_ASSIGN_OR_RETURN(Certificate certificate,
@@ -270,10 +281,7 @@ absl::StatusOr<TileSet> SynthesizeEmbedded(const Material& material, const Embed
                                 {"effort", params.effort},
                                 {"force", params.force}};
   set.metadata["exemplar"] = {{"width", material.width}, {"height", material.height}};
-  set.metadata["captured_variance"] = {{"search_dims", exemplar.search_dims()},
-                                       {"search_share", CapturedShare(embedding, kSearchDims)},
-                                       {"cut_dims", std::min(embedding.dims, kCutDims)},
-                                       {"cut_share", CapturedShare(embedding, kCutDims)}};
+  set.metadata["captured_variance"] = DescribeCaptured(laid_in);
   set.metadata["pattern"] = DescribePattern(pattern);
   set.metadata["notes"] = SizeNotes(pattern, asked, params);
   set.metadata["warnings"] = PeriodWarnings(arrangement, pattern, params);

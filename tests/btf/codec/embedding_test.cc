@@ -5,6 +5,7 @@
 
 #include "btf/codec/codec.h"
 #include "btf/codec/decoder.h"
+#include "btf/codec/embedding.h"
 #include "btf/math/hemisphere_gram.h"
 #include "tests/btf/codec/synthetic_btf.h"
 
@@ -59,6 +60,33 @@ TEST(EmbeddingTest, DistanceIsTheIntegratedSquaredDifference) {
         SquaredDistance(embedding->at(a.turns, a.x, a.y), embedding->at(b.turns, b.x, b.y), k);
     // The embedding is stored in float.
     EXPECT_NEAR(distance, integral, 1e-4 * integral) << "turns " << a.turns << " " << b.turns;
+  }
+}
+
+TEST(EmbeddingTest, DistanceOfImagesIsTheirWeightedDifferenceInAllTurns) {
+  const Material material = ShinyMaterial(3, 2, 9, 4);
+  const auto direction = [](double theta_deg, double phi_deg) {
+    return VectorFromDirection({.theta_rad = RadFromDeg(theta_deg), .phi_rad = RadFromDeg(phi_deg)});
+  };
+  const std::vector<WeightedImage> images = {{direction(30, 10), direction(55, 100), 2.0},
+                                             {direction(50, 200), direction(20, 310), 0.5}};
+  const auto embedding = EmbedImages(material, images, 100, {});
+  ASSERT_TRUE(embedding.ok()) << embedding.status();
+  ASSERT_EQ(embedding->dims, 24);
+  const auto decoder = MakeDecoder(material.btfels);
+  ASSERT_TRUE(decoder.ok());
+  for (const int turns_of_a : {0, 1, 3}) {
+    double sum = 0.0;
+    for (const WeightedImage& image : images) {
+      for (int turns = 0; turns < 4; ++turns) {
+        const auto seen = [&](int texel, int own_turns) {
+          return (*decoder)->Decode(material.btfels.btfel(texel), image.light, image.view, turns + own_turns);
+        };
+        sum += image.weight * image.weight * (seen(4, turns_of_a) - seen(2, 2)).square().sum();
+      }
+    }
+    const double distance = SquaredDistance(embedding->at(turns_of_a, 1, 1), embedding->at(2, 2, 0), 24);
+    EXPECT_NEAR(distance, sum, 1e-4 * sum) << turns_of_a;
   }
 }
 

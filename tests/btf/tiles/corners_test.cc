@@ -16,10 +16,10 @@ constexpr int kStripHeight = 8;
 
 Corners Choose(const Exemplar& exemplar, const char* arrangement, int strip_height, uint64_t seed) {
   const ExemplarSpectra spectra(exemplar, {0, 1, 2, 3}, RegionSide(exemplar, 8), RunContext{});
-  absl::StatusOr<Corners> corners =
+  absl::StatusOr<std::vector<Corners>> sets =
       ChooseCorners(spectra, **FindArrangement(arrangement), strip_height, seed, RunContext{});
-  EXPECT_TRUE(corners.ok()) << corners.status();
-  return *std::move(corners);
+  EXPECT_TRUE(sets.ok()) << sets.status();
+  return sets->front();
 }
 
 // First and last column and row of a sample in the unturned exemplar.

@@ -10,55 +10,14 @@
 
 #include "btf/base/reason.h"
 #include "btf/codec/codec.h"
-#include "btf/data/direction_sets.h"
-#include "btf/data/memory_btf.h"
 #include "btf/tiles/anisotropy.h"
 #include "btf/tiles/certificate.h"
-#include "tests/btf/tiles/noise_exemplar.h"
+#include "tests/btf/tiles/made_up_material.h"
 
 namespace tessera {
 namespace {
 
 using testing::HasSubstr;
-
-enum class Pattern { kBumps, kStripes };
-
-// A diffuse surface of bumps or of stripes along x, lit and seen from a few directions.
-Material MakeMaterial(int width, int height, Pattern pattern, std::string_view codec = "dsh-cls") {
-  const std::vector<double> noise = SmoothNoise(width, height, 2, 11);
-  BtfInfo info{.width = width,
-               .height = height,
-               .views = *DirectionSet("3x4"),
-               .lights = *DirectionSet("3x4"),
-               .provenance = {.source = "made up", .licence = "CC0", .citation = ""},
-               .radiometry = "reflectance"};
-  std::vector<float> samples;
-  const auto at = [&](int x, int y) {
-    x = (x + width) % width;
-    y = (y + height) % height;
-    return pattern == Pattern::kBumps ? noise[static_cast<size_t>(y) * width + x] : 0.4 * std::sin(1.3 * y);
-  };
-  for (int y = 0; y < height; ++y) {
-    for (int x = 0; x < width; ++x) {
-      const Eigen::Vector3d normal =
-          Eigen::Vector3d(at(x - 1, y) - at(x + 1, y), at(x, y + 1) - at(x, y - 1), 1.0).normalized();
-      for (int channel = 0; channel < 3; ++channel) {
-        const double albedo = 0.4 + 0.2 * at(x, y) + 0.05 * channel;
-        for (size_t view = 0; view < info.views.size(); ++view) {
-          for (const Direction& light : info.lights) {
-            samples.push_back(
-                static_cast<float>(albedo * std::max(0.0, normal.dot(VectorFromDirection(light)))));
-          }
-        }
-      }
-    }
-  }
-  const auto source = MemoryBtf::Create(info, samples);
-  EXPECT_TRUE(source.ok()) << source.status();
-  absl::StatusOr<Material> material = FindCodec(codec)->Encode(**source, {.kl = 9, .kv = 1}, RunContext{});
-  EXPECT_TRUE(material.ok()) << material.status();
-  return *std::move(material);
-}
 
 SynthesisParams SmallParams() {
   SynthesisParams params;
