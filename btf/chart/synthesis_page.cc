@@ -305,7 +305,7 @@ cheapest path that never turns back or by a minimum cut, through an overlap as w
 at random until d is below d_max, here half the mean squared distance of two texels; of the rest the best.</li>
 <li><b>frame, mismatch</b>: the paper's method, and its price of a seam. <b>frame, excess</b>: ours, with the price that counts only
 what a seam adds to the material's own steps, and an embedding of its own: of pictures from the measured directions, each divided by
-its mean step, most of them from grazing views.</li>
+the spread of its values, most of them from grazing views.</li>
 <li><b>R</b>: the certificate, 256 images spread over views and lights; steps along seams over the material's own there, 1 where a
 cut cannot be told from the material. It is a mean over cut pairs: how many there are stands in the table as cut share. Borders of
 diamonds are pieces of the exemplar, so that only their ends can have seams.</li>

@@ -40,9 +40,10 @@ constexpr int kMostHalfFeatures = 4;   // sides of windows that improve: one to 
 constexpr int kWindowsPerFeature = 4;
 constexpr int kFewestWindows = 24;
 constexpr int kPatience = 4;  // times as many while a threshold is missed
-// FillReport::step_ratio of a canvas that is good. Grazing views, from which seams show most, count more in
-// the embedding for seams than in a certificate, whose ratio is about a tenth lower.
-constexpr double kGoodRatio = 1.08;
+// By how much FillReport::step_ratio of a canvas that is good may exceed 1, divided by the effort. Grazing
+// views, from which seams show most, count more in the embedding for seams than in a certificate, whose ratio
+// is about a tenth lower.
+constexpr double kGoodExcess = 0.08;
 // The share of windows tried even on a good canvas: its few bad seams are seen all the same.
 constexpr double kGoodShare = 0.2;
 constexpr int kWindowsPerMeasure = 16;  // a canvas is measured once for so many
@@ -354,12 +355,13 @@ absl::Status Filler::Improve(const FillParams& params, const RunContext& context
   }
   const int64_t num_features = num_free / (params.feature_size * params.feature_size);
   const int64_t budget = params.effort * std::max<int64_t>(kFewestWindows, kWindowsPerFeature * num_features);
+  const double good_ratio = 1.0 + kGoodExcess / params.effort;
   BadTexels bad_texels(canvas);
   for (int64_t round = 0; round < budget * kPatience; ++round) {
     if (round % kWindowsPerMeasure == 0) {
       const FillReport measured = MeasureCanvas(canvas, params);
       if (measured.reached &&
-          (round >= budget || (round >= kGoodShare * budget && measured.step_ratio <= kGoodRatio))) {
+          (round >= budget || (round >= kGoodShare * budget && measured.step_ratio <= good_ratio))) {
         break;
       }
     }

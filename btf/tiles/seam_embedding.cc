@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <memory>
+#include <numeric>
 #include <span>
 #include <vector>
 
@@ -26,8 +27,8 @@ struct Ring {
 // The azimuths of views grow about as the tangent of 25, 50 and 75 degrees, the usual widest angle.
 constexpr Ring kViewRings[] = {{1.0 / 3.0, 4}, {2.0 / 3.0, 8}, {1.0, 24}};
 constexpr Ring kLightRings[] = {{1.0 / 3.0, 4}, {1.0, 8}};
-constexpr int kRowPairs = 32;  // that an image's mean step is measured in
-// Of the mean step over all images, added to each: an image that is nearly black counts little.
+constexpr int kMostRows = 64;  // that an image's spread is measured in
+// Of the mean spread over all images, added to each: an image that is nearly black counts little.
 constexpr double kDarkShare = 0.05;
 
 double WidestAngle(const std::vector<Direction>& directions) {
@@ -51,34 +52,25 @@ std::vector<Eigen::Vector3d> DirectionsOf(std::span<const Ring> rings, double wi
   return directions;
 }
 
-// The mean distance of neighbours in the image in all four turns, over some pairs of rows.
-double MeanStep(const Material& material, const Decoder& decoder, const WeightedImage& image) {
+// The root mean square distance of the image's RGB from their mean, in all four turns, over some rows.
+double Spread(const Material& material, const Decoder& decoder, const WeightedImage& image) {
   const int width = material.width;
   const auto k = static_cast<size_t>(material.btfels.num_coefficients);
-  const int num_pairs = std::min(kRowPairs, material.height - 1);
-  std::vector<float> rgb(size_t{6} * width);
-  double sum = 0.0;
-  int64_t count = 0;
-  const auto add = [&](int a, int b) {
-    const Eigen::Map<const Eigen::Vector3f> p(rgb.data() + 3 * a);
-    const Eigen::Map<const Eigen::Vector3f> q(rgb.data() + 3 * b);
-    sum += (p - q).norm();
-    ++count;
-  };
-  for (int pair = 0; pair < num_pairs; ++pair) {
-    const auto row = static_cast<size_t>(int64_t{pair} * (material.height - 1) / num_pairs);
-    const auto codes = std::span(material.btfels.codes).subspan(row * width * k, 2 * width * k);
+  const int num_rows = std::min(kMostRows, material.height);
+  Eigen::Matrix3Xf rgb(3, width);
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  double squares = 0.0;
+  for (int i = 0; i < num_rows; ++i) {
+    const auto row = static_cast<size_t>(int64_t{i} * material.height / num_rows);
+    const auto codes = std::span(material.btfels.codes).subspan(row * width * k, width * k);
     for (int turns = 0; turns < 4; ++turns) {
-      decoder.DecodeTexels(codes, image.light, image.view, turns, rgb);
-      for (int x = 0; x < width; ++x) {
-        add(x, width + x);
-        if (x + 1 < width) {
-          add(x, x + 1);
-        }
-      }
+      decoder.DecodeTexels(codes, image.light, image.view, turns, {rgb.data(), size_t{3} * width});
+      sum += rgb.cast<double>().rowwise().sum();
+      squares += rgb.cast<double>().squaredNorm();
     }
   }
-  return count > 0 ? sum / static_cast<double>(count) : 0.0;
+  const double count = 4.0 * num_rows * width;
+  return std::sqrt(std::max(0.0, squares / count - (sum / count).squaredNorm()));
 }
 
 }  // namespace
@@ -92,16 +84,14 @@ absl::StatusOr<Embedding> EmbedForSeams(const Material& material, int dims, cons
       images.push_back({light, view});
     }
   }
-  std::vector<double> steps(images.size());
+  std::vector<double> spreads(images.size());
   ParallelFor(context, 0, static_cast<int64_t>(images.size()), 1,
-              [&](int64_t i, int64_t) { steps[i] = MeanStep(material, *decoder, images[i]); });
+              [&](int64_t i, int64_t) { spreads[i] = Spread(material, *decoder, images[i]); });
   TESSERA_RETURN_IF_ERROR(context.CheckStop());
-  double mean = 0.0;
-  for (const double step : steps) {
-    mean += step / static_cast<double>(steps.size());
-  }
+  const double mean =
+      std::accumulate(spreads.begin(), spreads.end(), 0.0) / static_cast<double>(spreads.size());
   for (size_t i = 0; i < images.size(); ++i) {
-    images[i].weight = mean > 0.0 ? mean / (steps[i] + kDarkShare * mean) : 1.0;
+    images[i].weight = mean > 0.0 ? mean / (spreads[i] + kDarkShare * mean) : 1.0;
   }
   return EmbedImages(material, images, dims, context);
 }

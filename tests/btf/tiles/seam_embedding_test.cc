@@ -23,9 +23,8 @@ double SquaredDistance(const Embedding& embedding, int turns, int x, int y) {
   return sum;
 }
 
-// A seam shows against the material's own steps, so a material twice as bright has the same distances, up to
-// one factor for all of them.
-TEST(SeamEmbeddingTest, ComparesImagesByTheirOwnSteps) {
+// A material twice as bright has the same distances, up to one factor for all of them.
+TEST(SeamEmbeddingTest, DoesNotDependOnBrightness) {
   Material material = MakeMaterial(24, 20, Pattern::kBumps);
   const auto embedding = EmbedForSeams(material, kDims, {});
   ASSERT_TRUE(embedding.ok()) << embedding.status();
@@ -75,7 +74,7 @@ TEST(SeamEmbeddingTest, DoesNotDependOnThreads) {
   EXPECT_EQ(a->values, b->values);
 }
 
-TEST(SeamEmbeddingTest, TakesAMaterialWithoutSteps) {
+TEST(SeamEmbeddingTest, TakesAMaterialOfOneColour) {
   Material material = MakeMaterial(24, 20, Pattern::kBumps);
   std::ranges::fill(material.btfels.codes, 100);
   const auto embedding = EmbedForSeams(material, kDims, {});
