@@ -103,7 +103,7 @@ CornerCut CutPair(const Exemplar& exemplar, const std::vector<Patch>& samples, c
   // Across side `in`, the neighbouring tile shows the other half of that strip up to the vertex, here `out`
   // does.
   const uint32_t across = TexelOf(exemplar, samples, InTexel(pair, -1, 0, strip_height));
-  cut.cost += kVertexWeight * PairCost(exemplar, out[(half - 1) * half], across, GridCut::kLeft);
+  cut.vertex_cost = PairCost(exemplar, out[(half - 1) * half], across, GridCut::kLeft);
   for (int j = 0; j < half; ++j) {
     for (int i = 0; i < half; ++i) {
       cut.in_wins[static_cast<size_t>(j) * half + i] = grid.OnSourceSide(i, half - j) ? 0 : 1;
@@ -252,7 +252,8 @@ class CornerSearch {
   // Of a cut, per texel of its shortest course, in mean steps.
   [[nodiscard]] double PairMismatch(const CornerPair& pair) {
     const CornerCut cut = CutPair(exemplar_, samples_, pair, strip_height_, grid_, scratch_);
-    return MismatchOfCost(static_cast<double>(cut.cost)) / (strip_height_ / 2);
+    const auto cost = static_cast<double>(cut.cost + kVertexWeight * cut.vertex_cost);
+    return MismatchOfCost(cost) / (strip_height_ / 2);
   }
 
   [[nodiscard]] double Price(int sample) const {

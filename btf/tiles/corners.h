@@ -28,9 +28,8 @@ namespace tessera {
 struct CornerCut {
   CornerPair pair;
   std::vector<uint8_t> in_wins;  // [j][i], h/2 x h/2
-  // In the units of PairCost: of the cut, and sixteen times that of the vertex texel against the one across
-  // side `in`.
-  int64_t cost = 0;
+  int64_t cost = 0;              // PairCost along the cut
+  int vertex_cost = 0;           // that of the vertex texel and the one across side `in`
 };
 
 struct Corners {
