@@ -41,8 +41,7 @@ constexpr int kWindowsPerFeature = 4;
 constexpr int kFewestWindows = 24;
 constexpr int kPatience = 4;  // times as many while a threshold is missed
 // By how much FillReport::step_ratio of a canvas that is good may exceed 1, divided by the effort. Grazing
-// views, from which seams show most, count more in the embedding for seams than in a certificate, whose ratio
-// is about a tenth lower.
+// views, from which seams show most, count more in the embedding for seams than in a certificate.
 constexpr double kGoodExcess = 0.08;
 // The share of windows tried even on a good canvas: its few bad seams are seen all the same.
 constexpr double kGoodShare = 0.2;

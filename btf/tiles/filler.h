@@ -4,7 +4,7 @@
 // First windows of two and a half features are laid where most is still empty and enough is known around;
 // then smaller ones centred on bad seams (drawn in proportion to the square of their cost, those less that
 // were tried in vain) are matched again, and every patch is kept that makes the canvas cheaper, until its
-// seams show no more than the material's own steps. Old seams take part in every cut (seam_graph.h). An
+// seams show hardly more than the material's own steps. Old seams take part in every cut (seam_graph.h). An
 // unfilled texel counts as infinitely wrong, so a canvas is never accepted with one.
 #pragma once
 

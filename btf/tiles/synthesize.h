@@ -53,8 +53,8 @@ struct SynthesisParams {
   // Patches cut for each window that is improved; half of it, rounded up, for each that is filled. At
   // least 1.
   int num_candidates = 16;
-  // How many times as many windows are tried while seams show more than the material's own steps do. In
-  // [1, kMostEffort].
+  // How many times as many windows are tried while seams show more than the material's own steps do, and how
+  // many times nearer to those they must come to be good. In [1, kMostEffort].
   int effort = 1;
   DiamondParams diamonds;
   std::optional<Recipe> recipe;  // of kFrame
