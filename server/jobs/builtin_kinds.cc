@@ -10,11 +10,11 @@ namespace tessera {
 
 std::vector<JobKind> BuiltinJobKinds() {
   return {
-      {"import", 1, &RunImportJob},
-      {"generate", 1, &RunGenerateJob},
-      {"synthesize", 2, &RunSynthesizeJob},
-      {std::string(kCertifyKind), 1, &RunCertifyJob, /*updates_result=*/true},
-      {std::string(kThumbnailKind), 1, &RunThumbnailJob},
+      {"import", 2, &RunImportJob},
+      {"generate", 2, &RunGenerateJob},
+      {"synthesize", 3, &RunSynthesizeJob},
+      {std::string(kCertifyKind), 2, &RunCertifyJob, /*updates_result=*/true},
+      {std::string(kThumbnailKind), 2, &RunThumbnailJob},
   };
 }
 

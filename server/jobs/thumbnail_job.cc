@@ -1,12 +1,14 @@
 #include "server/jobs/thumbnail_job.h"
 
+#include <algorithm>
+#include <bit>
 #include <cmath>
+#include <cstdint>
 #include <memory>
 #include <span>
 
 #include "btf/base/status_macros.h"
 #include "btf/image/image_io.h"
-#include "btf/mips/tile_mips.h"
 #include "btf/render/composite.h"
 #include "btf/render/offscreen_context.h"
 #include "btf/render/preview.h"
@@ -17,9 +19,9 @@
 namespace tessera {
 namespace {
 
-constexpr int kSquareQuads = 2;               // along a side
-constexpr double kTexelsWithoutLevels = 2.0;  // along a pixel's side
-constexpr double kFrameOfSquare = 0.99;       // so that no pixel of the frame lies at the square's edge
+constexpr int kSquareQuads = 2;          // along a side
+constexpr double kFrameOfSquare = 0.99;  // so that no pixel of the frame lies at the square's edge
+constexpr uint32_t kMostScale = 16;      // pixels drawn along the side of one that is kept
 
 // [-1, 1] x [-1, 1] x 0, facing +z.
 QuadMesh Square() {
@@ -40,6 +42,20 @@ QuadMesh Square() {
   return mesh;
 }
 
+// A pixel for each block of scale x scale.
+Image MeansOfBlocks(const Image& image, int scale) {
+  Image means(image.width / scale, image.height / scale, image.channels);
+  const float share = 1.0F / static_cast<float>(scale * scale);
+  for (int y = 0; y < means.height * scale; ++y) {
+    for (int x = 0; x < means.width * scale; ++x) {
+      for (int channel = 0; channel < image.channels; ++channel) {
+        means.at(x / scale, y / scale)[channel] += share * image.at(x, y)[channel];
+      }
+    }
+  }
+  return means;
+}
+
 }  // namespace
 
 absl::StatusOr<JobOutput> RunThumbnailJob(const JobInput& input, const JobContext& context) {
@@ -56,16 +72,13 @@ absl::StatusOr<JobOutput> RunThumbnailJob(const JobInput& input, const JobContex
   PreviewScene scene{.dressing = &dressed.dressing, .tile_set = &tile_set};
   scene.width = scene.height = kThumbnailSide;
   scene.camera.eye = {0.0, 0.0, kFrameOfSquare / std::tan(0.5 * scene.camera.fov_y_rad)};
-  TileMips mips;
-  const bool has_levels = tile_set.tile_size % 2 == 0;
-  if (has_levels && TexelsPerPixel(scene) > kTexelsWithoutLevels) {
-    TESSERA_ASSIGN_OR_RETURN(mips, MakeTileMips(tile_set, {}, context.run));
-    scene.mips = &mips;
-  }
+  const uint32_t scale =
+      std::min(kMostScale, std::bit_ceil(static_cast<uint32_t>(std::ceil(TexelsPerPixel(scene)))));
+  scene.width = scene.height = kThumbnailSide * static_cast<int>(scale);
   TESSERA_ASSIGN_OR_RETURN(const std::unique_ptr<OffscreenContext> gl, CreateOsmesaContext());
   TESSERA_ASSIGN_OR_RETURN(const Image covered, RenderGl(*gl, scene, context.run));
   TESSERA_ASSIGN_OR_RETURN(const Image picture, CompositeOver(covered, Background{}));
-  TESSERA_ASSIGN_OR_RETURN(std::string png, EncodePng(picture));
+  TESSERA_ASSIGN_OR_RETURN(std::string png, EncodePng(MeansOfBlocks(picture, static_cast<int>(scale))));
   return JobOutput{std::move(png), v1::TileSet()};
 }
 

@@ -63,9 +63,9 @@ TEST_F(ServerTest, MeshesAreDressedAndKept) {
 }
 
 // Every texel of every tile shows the one BTFel of the tiny material.
-TileSet TinyTileSet() {
+TileSet TinyTileSet(const char* arrangement_id = "surface-96") {
   const Material material = TinyMaterial();
-  const Arrangement* arrangement = *FindArrangement("surface-96");
+  const Arrangement* arrangement = *FindArrangement(arrangement_id);
   TileSet tile_set;
   tile_set.arrangement_id = arrangement->id;
   tile_set.arrangement_sha256 = arrangement->sha256;
@@ -132,6 +132,46 @@ TEST_F(ServerTest, AThumbnailIsDrawnOfEachNewTileSet) {
   const auto again = RunThumbnailJob({"", {create.blob_sha256()}}, context);
   ASSERT_TRUE(again.ok()) << again.status();
   EXPECT_EQ(again->blob, *png);
+}
+
+// The red of the thumbnail of tiles whose columns alternate between two BTFels, eight to a pixel.
+absl::StatusOr<std::vector<float>> RedOfColumns(uint32_t even, uint32_t odd) {
+  constexpr int kSide = 512;
+  TileSet tile_set = TinyTileSet("plane-16");
+  tile_set.tile_size = kSide;
+  tile_set.btfels.step = {0.05F, 0.05F, 0.05F};
+  tile_set.btfels.codes.assign(6, 0);
+  tile_set.btfels.codes[0] = 10;  // of the first BTFel's luminance
+  tile_set.btfels.codes[3] = 2;
+  tile_set.tile_index.resize(tile_set.tile_codes.size() * kSide * kSide);
+  for (size_t texel = 0; texel < tile_set.tile_index.size(); ++texel) {
+    tile_set.tile_index[texel] = PackTexel(texel % 2 == 0 ? even : odd, 0);
+  }
+  TESSERA_ASSIGN_OR_RETURN(std::string bytes, SerializeTileSet(tile_set));
+  const OneBlob reader(std::move(bytes));
+  JobContext context;
+  context.blobs = &reader;
+  TESSERA_ASSIGN_OR_RETURN(const JobOutput output, RunThumbnailJob({"", {"blob"}}, context));
+  TESSERA_ASSIGN_OR_RETURN(const Image picture,
+                           DecodeImage(std::as_bytes(std::span(output.blob)), "thumbnail.png", std::nullopt));
+  std::vector<float> red;
+  for (size_t i = 0; i < picture.pixels.size(); i += 3) {
+    red.push_back(picture.pixels[i]);
+  }
+  return red;
+}
+
+TEST(Thumbnail, ShowsTheMeanOfTexelsThatShareAPixel) {
+  const auto bright = RedOfColumns(0, 0);
+  const auto dark = RedOfColumns(1, 1);
+  const auto mixed = RedOfColumns(0, 1);
+  ASSERT_TRUE(bright.ok() && dark.ok() && mixed.ok()) << bright.status() << dark.status() << mixed.status();
+  for (size_t pixel = 0; pixel < mixed->size(); ++pixel) {
+    const float mean = 0.5F * ((*bright)[pixel] + (*dark)[pixel]);
+    ASSERT_GT((*bright)[pixel], 3.0F * (*dark)[pixel]);
+    ASSERT_LT((*bright)[pixel], 1.0F);
+    EXPECT_NEAR((*mixed)[pixel], mean, 0.05F * mean) << pixel;
+  }
 }
 
 TEST_F(ServerTest, PicturesAreDrawn) {
