@@ -124,6 +124,17 @@ double MeanMismatch(const Exemplar& exemplar, const std::vector<CutPair>& pairs)
   return MismatchOfCost(mean) * exemplar.mean_step() / exemplar.spread();
 }
 
+// Of the seams within tiles, see SynthesisPoint::seen_ratio.
+double StepRatio(const Exemplar& exemplar, const std::vector<CutPair>& pairs) {
+  double step = 0.0;
+  double own_step = 0.0;
+  for (const CutPair& pair : pairs) {
+    step += exemplar.Distance(pair.a, pair.b);
+    own_step += OwnStep(exemplar, pair.a, pair.b, pair.direction);
+  }
+  return own_step > 0.0 ? step / own_step : 1.0;
+}
+
 // The middle of 0 .. side - 1.
 std::vector<int> Middle(int side, int most) {
   std::vector<int> indices(std::min(side, most));
@@ -214,6 +225,7 @@ class SynthesisRun {
                              MeasureRepetition(judge_, arrangement_, maps, params.strip_height, quiet_));
     point.repetition = repetition["ratio"].get<double>();
     const Exemplar seen(embedding_, SeamRule::kMismatch, setting.dims);
+    point.seen_ratio = StepRatio(seen, insides.seams().pairs);
     point.seen_error = MeanMismatch(seen, insides.seams().pairs);
     point.full_error = MeanMismatch(full_, insides.seams().pairs);
     TileSet tiles = TileSetOfMaps(material_, arrangement_, maps, params);
@@ -300,6 +312,7 @@ std::string SynthesisCsv(const std::vector<SynthesisChart>& charts) {
                              "insides_ratio",
                              "insides_ratio_p95",
                              "insides_cut_share",
+                             "seen_ratio",
                              "seen_error",
                              "full_error",
                              "repetition",
@@ -322,6 +335,7 @@ std::string SynthesisCsv(const std::vector<SynthesisChart>& charts) {
                       FigureText(point.insides_ratio),
                       FigureText(point.insides_ratio_p95),
                       FigureText(point.insides_cut_share),
+                      FigureText(point.seen_ratio),
                       FigureText(point.seen_error),
                       FigureText(point.full_error),
                       FigureText(point.repetition),

@@ -60,6 +60,10 @@ struct SynthesisPoint {
   double insides_cut_share = 0.0;  // of pairs
   double repetition = 0.0;
   double referenced_share = 0.0;
+  // R of the certificate with distances in the codec's embedding in place of reflectance, in as many
+  // dimensions as the cuts saw of theirs: steps across seams over the steps that the patches have there of
+  // their own. Insides.
+  double seen_ratio = 0.0;
   // Mean mismatch of a seam's two patches, both its texels, in units of the root mean square distance of two
   // texels drawn at random, in the codec's embedding: in as many dimensions as the cuts saw of theirs, and in
   // all. Insides.

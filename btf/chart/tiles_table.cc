@@ -19,7 +19,6 @@ namespace tessera {
 namespace {
 
 constexpr char kTilesArrangement[] = "surface-96";
-constexpr int kLargestUnaskedSide = 128;  // of PaperSize::kWithoutLargest
 
 // [Leung2007] Tables I and III. FLOORTILE has fewer directions than the paper's, so that its images are small
 // enough to make; synthesis takes as long, for it sees coefficients.
@@ -105,22 +104,15 @@ absl::StatusOr<TilesRun> RunRow(const TilesRow& row, const RunContext& context) 
 
 }  // namespace
 
-absl::StatusOr<std::vector<TilesRow>> RunTilesTable(PaperSize size, const RunContext& context) {
+absl::StatusOr<std::vector<TilesRow>> RunTilesTable(const RunContext& context) {
   std::vector<TilesRow> rows = PaperTilesRows();
-  const auto is_run = [&](const TilesRow& row) {
-    return size == PaperSize::kAll || row.side <= kLargestUnaskedSide;
-  };
   RunContext quiet = context;
   quiet.progress = nullptr;
-  const auto total = static_cast<size_t>(std::ranges::count_if(rows, is_run));
-  size_t done = 0;
-  for (TilesRow& row : rows) {
-    if (is_run(row)) {
-      context.Report("paper", done++, total, "tile sets");
-      TESSERA_ASSIGN_OR_RETURN(row.run, RunRow(row, quiet));
-    }
+  for (size_t row = 0; row < rows.size(); ++row) {
+    context.Report("paper", row, rows.size(), "tile sets");
+    TESSERA_ASSIGN_OR_RETURN(rows[row].run, RunRow(rows[row], quiet));
   }
-  context.Report("paper", total, total, "tile sets");
+  context.Report("paper", rows.size(), rows.size(), "tile sets");
   return rows;
 }
 
@@ -138,12 +130,10 @@ std::string TilesCsv(const std::vector<TilesRow>& rows) {
     };
     add({"paper", "", absl::StrCat(60.0 * row.paper_minutes), "", absl::StrFormat("%.4f", row.paper_share),
          absl::StrFormat("%.2f", row.paper_megabytes), ""});
-    if (row.run) {
-      add({"frame", row.source, absl::StrFormat("%.2f", row.run->seconds),
-           absl::StrFormat("%.2f", row.run->embed_s), absl::StrFormat("%.4f", row.run->referenced_share),
-           absl::StrFormat("%.2f", 1e-6 * static_cast<double>(row.run->btfel_bytes)),
-           absl::StrFormat("%.4f", row.run->insides_ratio)});
-    }
+    add({"frame", row.source, absl::StrFormat("%.2f", row.run.seconds),
+         absl::StrFormat("%.2f", row.run.embed_s), absl::StrFormat("%.4f", row.run.referenced_share),
+         absl::StrFormat("%.2f", 1e-6 * static_cast<double>(row.run.btfel_bytes)),
+         absl::StrFormat("%.4f", row.run.insides_ratio)});
   }
   return csv;
 }

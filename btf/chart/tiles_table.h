@@ -2,14 +2,12 @@
 #pragma once
 
 #include <cstdint>
-#include <optional>
 #include <string>
 #include <vector>
 
 #include <absl/status/statusor.h>
 
 #include "btf/base/run_context.h"
-#include "btf/chart/paper_table.h"
 
 namespace tessera {
 
@@ -30,14 +28,14 @@ struct TilesRow {
   double paper_minutes = 0.0;
   double paper_share = 0.0;
   double paper_megabytes = 0.0;
-  std::optional<TilesRun> run;  // none where the row was not run
+  TilesRun run;
 };
 
 // Synthesises "surface-96" by the default parameters, thresholds not enforced, from generated materials of
-// the paper's sizes, encoded by "dsh" with as many coefficients. kAll takes the materials of 256 x 256 and of
-// 800 x 800 texels, too. Progress in "tile sets". Errors: those of GenerateBtf, of Encode and of synthesis;
-// CANCELLED.
-[[nodiscard]] absl::StatusOr<std::vector<TilesRow>> RunTilesTable(PaperSize size, const RunContext& context);
+// the paper's sizes, encoded by "dsh" with as many coefficients; about ten minutes on two cores, most of them
+// to encode 800 x 800 texels. Progress in "tile sets". Errors: those of GenerateBtf, of Encode and of
+// synthesis; CANCELLED.
+[[nodiscard]] absl::StatusOr<std::vector<TilesRow>> RunTilesTable(const RunContext& context);
 
 // One row each row of the table and method, the paper's figures as method "paper".
 [[nodiscard]] std::string TilesCsv(const std::vector<TilesRow>& rows);

@@ -26,14 +26,6 @@ float Mismatch(const Exemplar& exemplar, uint32_t a, uint32_t b) {
   return a == b ? 0.0f : exemplar.Distance(a, b);
 }
 
-// Of the seam between a and b: the mean of the steps that their patches have there, or the one there is.
-float OwnStep(const Exemplar& exemplar, uint32_t a, uint32_t b, int direction) {
-  const bool a_goes_on = exemplar.Step(a, direction) != kNoTexel;
-  const bool b_goes_on = exemplar.Step(b, direction ^ 2) != kNoTexel;
-  const float sum = exemplar.StepLength(a, direction) + exemplar.StepLength(b, direction ^ 2);
-  return a_goes_on && b_goes_on ? 0.5f * sum : sum;
-}
-
 }  // namespace
 
 int PairCost(const Exemplar& exemplar, uint32_t a, uint32_t b, int direction) {
@@ -54,6 +46,13 @@ int PairCost(const Exemplar& exemplar, uint32_t a, uint32_t b, int direction) {
   }
   return cost(Mismatch(exemplar, a, b_at_a) + Mismatch(exemplar, a_at_b, b),
               exemplar.StepLength(a, direction) + exemplar.StepLength(b, direction ^ 2));
+}
+
+float OwnStep(const Exemplar& exemplar, uint32_t a, uint32_t b, int direction) {
+  const bool a_goes_on = exemplar.Step(a, direction) != kNoTexel;
+  const bool b_goes_on = exemplar.Step(b, direction ^ 2) != kNoTexel;
+  const float sum = exemplar.StepLength(a, direction) + exemplar.StepLength(b, direction ^ 2);
+  return a_goes_on && b_goes_on ? 0.5f * sum : sum;
 }
 
 Canvas::Canvas(const Exemplar& exemplar, int width, int height)

@@ -33,6 +33,10 @@ inline constexpr int kMaxPairCost = GridCut::kMaxCapacitySum / 2;
 // continuation falls off the exemplar the other counts twice; where both do, |a - b| does, beside no step.
 int PairCost(const Exemplar& exemplar, uint32_t a, uint32_t b, int direction);
 
+// The mean of the steps, distances in the embedding, that the patches of such a seam have there of their own;
+// the one there is where one continuation falls off the exemplar, 0 where both do.
+float OwnStep(const Exemplar& exemplar, uint32_t a, uint32_t b, int direction);
+
 // Half of what a pair costs, in mean steps: under kMismatch the average mismatch of its two texels.
 constexpr double MismatchOfCost(double cost) {
   return cost / (2.0 * kCostPerStep);

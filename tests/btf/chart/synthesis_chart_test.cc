@@ -46,6 +46,8 @@ TEST(SynthesisChartTest, VariesOneParameterAtATimeAndJudgesAllMethodsAlike) {
       EXPECT_EQ(point.draws > 0, is_diamond);
       EXPECT_LE(point.draws, is_diamond ? setting.candidates : 0);
       EXPECT_GT(point.insides_ratio, 0.5);
+      // Where neighbours are independent of each other, so are the texels at a seam.
+      EXPECT_NEAR(point.seen_ratio, 1.0, 0.2);
       EXPECT_GT(point.seen_error, 0.0);
       if (setting.dims == chart->embedding_dims) {
         EXPECT_DOUBLE_EQ(point.seen_error, point.full_error);
@@ -71,6 +73,7 @@ SynthesisChart MadeUpChart() {
     point.borders_ratio = 1.25;
     point.insides_ratio = 1.5;
     point.insides_cut_share = 0.1;
+    point.seen_ratio = 1.75;
     point.seen_error = 0.3;
     point.full_error = 0.4;
     point.repetition = 2.0;
@@ -87,25 +90,24 @@ TEST(SynthesisChartTest, CsvHasOneRowAPoint) {
   EXPECT_EQ(
       line,
       "source,width,height,tile_size,method,seam_rule,dims,candidates,strip_height,seed,seconds,draws,"
-      "borders_ratio,insides_ratio,insides_ratio_p95,insides_cut_share,seen_error,full_error,repetition,"
-      "referenced_share");
+      "borders_ratio,insides_ratio,insides_ratio_p95,insides_cut_share,seen_ratio,seen_error,full_error,"
+      "repetition,referenced_share");
   std::getline(csv, line);
   EXPECT_EQ(line,
-            "\"hand, <made>\",64,64,32,diamond-dp,mismatch,32,256,8,1,1.5,0,1.25,1.5,0,0.1,0.3,0.4,2,0");
+            "\"hand, <made>\",64,64,32,diamond-dp,mismatch,32,256,8,1,1.5,0,1.25,1.5,0,0.1,1.75,0.3,0.4,2,0");
   std::getline(csv, line);
-  EXPECT_EQ(line, "\"hand, <made>\",64,64,32,frame,excess,32,16,8,1,1.5,0,1.25,1.5,0,0.1,0.3,0.4,2,0");
+  EXPECT_EQ(line, "\"hand, <made>\",64,64,32,frame,excess,32,16,8,1,1.5,0,1.25,1.5,0,0.1,1.75,0.3,0.4,2,0");
   EXPECT_FALSE(std::getline(csv, line));
 }
 
 TEST(SynthesisChartTest, PageIsSelfContained) {
   TilesRow row{.material = "HOLES", .source = "generated:holes", .side = 128, .tile_size = 100, .k = 25};
   row.paper_minutes = 25;
-  TilesRow run = row;
-  run.run = TilesRun{.seconds = 30.0, .referenced_share = 0.5, .btfel_bytes = 15360000};
-  const auto html = SynthesisHtml({MadeUpChart()}, {row, run});
+  row.run = TilesRun{.seconds = 30.0, .referenced_share = 0.5, .btfel_bytes = 15360000};
+  const auto html = SynthesisHtml({MadeUpChart()}, {row});
   ASSERT_TRUE(html.ok()) << html.status();
   for (const char* const text : {"hand, &lt;made&gt;", "frame, excess", "data:image/png;base64,", "R 1.500",
-                                 "not run", "50x", "15.36", "1: 50.0%, 2: 75.0%."}) {
+                                 "50x", "15.36", "1: 50.0%, 2: 75.0%."}) {
     EXPECT_THAT(*html, HasSubstr(text));
   }
   for (const char* const text : {"src=\"http", "<link", "<script", "nan"}) {
