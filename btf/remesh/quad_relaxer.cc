@@ -24,6 +24,7 @@ constexpr double kSnapSides = 0.6;
 constexpr double kCornerSides = 1.2;
 // Snapping keeps corners within this of a right angle, unless they were worse.
 constexpr double kSnapDeviationRad = 60.0 * std::numbers::pi / 180.0;
+constexpr int kStepsPerMiss = 2;  // what the mesh misses is found anew every other step
 constexpr int kRepairSweeps = 30;
 constexpr std::array<double, 4> kRepairSteps{0.4, 0.2, 0.08, 0.03};  // in sides
 constexpr int kRepairDirections = 8;
@@ -142,14 +143,51 @@ size_t QuadRelaxer::CountFlipped() const {
   return flipped;
 }
 
+absl::StatusOr<std::vector<Eigen::Vector3d>> QuadRelaxer::FindMisses() const {
+  std::vector<Eigen::Vector3d> misses(positions_.size(), Eigen::Vector3d::Zero());
+  if (samples_.empty()) {
+    return misses;
+  }
+  const std::vector<Triangle> halves = HalvesOf(quads_);
+  TESSERA_ASSIGN_OR_RETURN(const ClosestPoint mesh, ClosestPoint::Create(positions_, halves));
+  std::vector<SurfacePoint> closest(samples_.size());
+  ParallelFor(context_, 0, static_cast<int64_t>(samples_.size()), kItemsPerRange,
+              [&](int64_t begin, int64_t end) {
+                for (auto i = static_cast<size_t>(begin); i < static_cast<size_t>(end); ++i) {
+                  closest[i] = mesh.FindFacing(samples_[i].position, samples_[i].normal);
+                }
+              });
+  TESSERA_RETURN_IF_ERROR(context_.CheckStop());
+  std::vector<double> weights(positions_.size(), 0.0);
+  for (size_t i = 0; i < samples_.size(); ++i) {
+    const Eigen::Vector3d miss = samples_[i].position - closest[i].position;
+    for (int k = 0; k < 3; ++k) {
+      const uint32_t v = halves[closest[i].triangle][k];
+      const double weight = closest[i].barycentric[k] * miss.norm();
+      misses[v] += weight * miss;
+      weights[v] += weight;
+    }
+  }
+  for (size_t v = 0; v < misses.size(); ++v) {
+    if (weights[v] > 0.0) {
+      misses[v] /= weights[v];
+    }
+  }
+  return misses;
+}
+
 absl::Status QuadRelaxer::Relax(std::string_view stage, int num_steps) {
   std::vector<std::array<Eigen::Vector3d, 4>> squares(quads_.size());
+  std::vector<Eigen::Vector3d> misses;
   std::vector<SurfacePoint> places(positions_.size());
   std::vector<SurfacePoint> before(positions_.size());
   std::vector<uint8_t> was_flipped(quads_.size());
   for (int step = 0; step < num_steps; ++step) {
     TESSERA_RETURN_IF_ERROR(context_.CheckStop());
     context_.Report(stage, static_cast<uint64_t>(step), static_cast<uint64_t>(num_steps), "steps");
+    if (step % kStepsPerMiss == 0) {
+      TESSERA_ASSIGN_OR_RETURN(misses, FindMisses());
+    }
     ParallelFor(context_, 0, static_cast<int64_t>(quads_.size()), kItemsPerRange,
                 [&](int64_t begin, int64_t end) {
                   for (auto i = static_cast<size_t>(begin); i < static_cast<size_t>(end); ++i) {
@@ -167,7 +205,7 @@ absl::Status QuadRelaxer::Relax(std::string_view stage, int num_steps) {
                     for (const uint32_t corner : CornersAt(v)) {
                       sum += squares[corner / 4][corner % 4];
                     }
-                    places[v] = Allowed(v, sum / static_cast<double>(CornersAt(v).size()));
+                    places[v] = Allowed(v, sum / static_cast<double>(CornersAt(v).size()) + misses[v]);
                   }
                 });
     TESSERA_RETURN_IF_ERROR(context_.CheckStop());

@@ -2,19 +2,22 @@
 //
 //   QuadRelaxer relaxer(surface, std::move(positions), quads, context);
 //   TESSERA_RETURN_IF_ERROR(relaxer.Attach(3));
+//   relaxer.Cover(std::move(samples));
 //   TESSERA_RETURN_IF_ERROR(relaxer.Relax("relax", 200));
 //   relaxer.SnapToCreases(creases);
 //   TESSERA_RETURN_IF_ERROR(relaxer.Repair(0.7));
 //
 // Each quad asks for the square nearest to it, of a side between its own and the mesh's; a vertex goes to the
-// mean of what its quads ask for and from there to the closest point of the surface. Whatever is left with a
-// bad corner is repaired by trying places around its vertices.
+// mean of what its quads ask for, moved so that the mesh comes nearer to samples of the surface that it
+// misses, and from there to the closest point of the surface. Vertices on the surface alone leave out rims
+// and tips between them. Whatever is left with a bad corner is repaired by trying places around its vertices.
 #pragma once
 
 #include <array>
 #include <cstdint>
 #include <span>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include <absl/status/status.h>
@@ -36,6 +39,11 @@ struct QuadShape {
   bool flipped = false;  // faces against the surface, or has a corner that turns against its own normal
 };
 
+struct SurfaceSample {
+  Eigen::Vector3d position;
+  Eigen::Vector3d normal;  // outward, unit
+};
+
 class QuadRelaxer {
  public:
   // Borrows all but the positions. `quads` is a closed oriented manifold.
@@ -44,6 +52,8 @@ class QuadRelaxer {
 
   // Draws the mesh from about the surface onto it in so many steps, smoothing in each. Errors: CANCELLED.
   [[nodiscard]] absl::Status Attach(int num_steps);
+  // What Relax keeps the mesh near to, from then on: points all over the surface. None at first.
+  void Cover(std::vector<SurfaceSample> samples) { samples_ = std::move(samples); }
   // Steps towards squares; where one would flip quads that were not, vertices stay. Errors: CANCELLED.
   [[nodiscard]] absl::Status Relax(std::string_view stage, int num_steps);
   // Moves vertices onto creases and their corners where that leaves every quad in shape; they stay on them.
@@ -75,6 +85,9 @@ class QuadRelaxer {
   [[nodiscard]] double Energy(size_t vertex) const;
   [[nodiscard]] double WorstDeviation(size_t vertex) const;
   void Place(size_t vertex, const SurfacePoint& at);
+  // From the mesh to the samples, for each vertex: the mean over those whose closest quads it is a corner of,
+  // weighted by how near it is and by how far they are.
+  [[nodiscard]] absl::StatusOr<std::vector<Eigen::Vector3d>> FindMisses() const;
 
   const ClosestPoint& surface_;
   std::vector<Eigen::Vector3d> positions_;
@@ -85,6 +98,7 @@ class QuadRelaxer {
   std::vector<uint32_t> corners_;       // 4 quad + corner
   std::vector<uint32_t> at_;            // [vertex] triangle of the surface
   std::vector<Hold> hold_;
+  std::vector<SurfaceSample> samples_;
   double mean_side_ = 0.0;
 };
 

@@ -28,6 +28,7 @@ constexpr double kCreaseAngleRad = 40.0 / kDegrees;
 // Creases shorter than this many sides of a quad are left to the relaxation.
 constexpr double kLeastCreaseSides = 4.0;
 constexpr int kFreeSteps = 120;
+constexpr double kSamplesPerQuad = 8.0;  // of the surface, that the quads are kept near to
 // Vertices that no round of snapping could move yet may be moved after the steps of the one before.
 constexpr int kSnapRounds = 3;
 constexpr int kCreaseSteps = 20;
@@ -183,6 +184,37 @@ absl::StatusOr<std::vector<VoxelSurface>> VoxelCandidates(std::span<const Eigen:
   return candidates;
 }
 
+// About `count` points, evenly over the area.
+std::vector<SurfaceSample> SamplesOf(std::span<const Eigen::Vector3d> positions,
+                                     std::span<const Triangle> triangles, const ClosestPoint& surface,
+                                     double count) {
+  const auto area_of = [&](const Triangle& t) {
+    return 0.5 * (positions[t[1]] - positions[t[0]]).cross(positions[t[2]] - positions[t[0]]).norm();
+  };
+  double total = 0.0;
+  for (const Triangle& triangle : triangles) {
+    total += area_of(triangle);
+  }
+  std::vector<SurfaceSample> samples;
+  double owed = 0.5;
+  for (size_t i = 0; i < triangles.size(); ++i) {
+    const Triangle& t = triangles[i];
+    for (owed += area_of(t) / total * count; owed >= 1.0; owed -= 1.0) {
+      // Places by multiples of irrational numbers, folded from the square into the triangle.
+      const auto n = static_cast<double>(samples.size());
+      double b = std::fmod(n * 0.7548776662, 1.0);
+      double c = std::fmod(n * 0.5698402910, 1.0);
+      if (b + c > 1.0) {
+        b = 1.0 - b;
+        c = 1.0 - c;
+      }
+      samples.push_back({(1.0 - b - c) * positions[t[0]] + b * positions[t[1]] + c * positions[t[2]],
+                         surface.normals()[i]});
+    }
+  }
+  return samples;
+}
+
 // The first of the candidates that can be drawn onto the surface without flipping a quad, or the one that
 // flips the fewest.
 absl::StatusOr<QuadRelaxer> AttachVoxels(const std::vector<VoxelSurface>& candidates,
@@ -210,14 +242,8 @@ absl::StatusOr<QuadRelaxer> AttachVoxels(const std::vector<VoxelSurface>& candid
 absl::Status MeasureDistance(std::span<const Eigen::Vector3d> positions, std::span<const Triangle> triangles,
                              const ClosestPoint& surface, const QuadRelaxer& relaxer,
                              std::span<const Quad> quads, const RunContext& context, RemeshReport& report) {
-  std::vector<Triangle> halves;
-  halves.reserve(2 * quads.size());
-  for (const Quad& quad : quads) {
-    halves.push_back({quad[0], quad[1], quad[2]});
-    halves.push_back({quad[0], quad[2], quad[3]});
-  }
   TESSERA_ASSIGN_OR_RETURN(const ClosestPoint remeshed,
-                           ClosestPoint::Create(relaxer.positions(), std::move(halves)));
+                           ClosestPoint::Create(relaxer.positions(), HalvesOf(quads)));
   std::vector<bool> used(positions.size(), false);
   for (const Triangle& triangle : triangles) {
     for (const uint32_t v : triangle) {
@@ -322,6 +348,8 @@ absl::StatusOr<RemeshResult> RemeshTriangles(const TriangleMesh& mesh, const Rem
   const VoxelSurface& voxels = candidates[chosen];
   report.topology_out = voxels.topology;
   report.num_quads = voxels.quads.size();
+  relaxer.Cover(SamplesOf(unit.positions, mesh.triangles, surface,
+                          kSamplesPerQuad * static_cast<double>(report.num_quads)));
   TESSERA_RETURN_IF_ERROR(relaxer.Relax("relax", kFreeSteps));
   const double side = EstimateCell(unit.positions, mesh.triangles, params.target_quads);
   TESSERA_ASSIGN_OR_RETURN(const Creases creases, FindCreases(unit.positions, mesh.triangles, surface,

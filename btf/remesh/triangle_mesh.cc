@@ -110,6 +110,16 @@ double SignedVolume(const TriangleMesh& mesh) {
 
 }  // namespace
 
+std::vector<Triangle> HalvesOf(std::span<const Quad> quads) {
+  std::vector<Triangle> halves;
+  halves.reserve(2 * quads.size());
+  for (const Quad& quad : quads) {
+    halves.push_back({quad[0], quad[1], quad[2]});
+    halves.push_back({quad[0], quad[2], quad[3]});
+  }
+  return halves;
+}
+
 absl::StatusOr<SurfaceTopology> CheckClosedSurface(const TriangleMesh& mesh) {
   TESSERA_ASSIGN_OR_RETURN(const std::vector<uint32_t> across, SidesAcross(mesh));
   for (uint32_t side = 0; side < across.size(); ++side) {

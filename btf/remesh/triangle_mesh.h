@@ -7,6 +7,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include <absl/status/status.h>
@@ -23,6 +24,9 @@ struct TriangleMesh {
   std::vector<Eigen::Vector3f> positions;
   std::vector<Triangle> triangles;
 };
+
+// Each quad as two triangles, 2 q and 2 q + 1 of quad q.
+[[nodiscard]] std::vector<Triangle> HalvesOf(std::span<const Quad> quads);
 
 // Pieces and handles of a closed surface; genus is summed over the pieces.
 struct SurfaceTopology {

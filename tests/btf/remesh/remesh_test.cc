@@ -112,6 +112,20 @@ TEST(RemeshTest, BoxesKeepTheirEdgesAndCorners) {
   EXPECT_EQ(Measure(result->mesh).folded, 0);
 }
 
+TEST(RemeshTest, AThinRimIsReachedAllAround) {
+  // A lens, askew to the voxels.
+  TriangleMesh lens = Halved(*BuiltinShape("cube-sphere"));
+  const Eigen::Matrix3f turn =
+      Eigen::AngleAxisf(0.6F, Eigen::Vector3f(0.36F, 0.48F, 0.8F)).toRotationMatrix();
+  for (Eigen::Vector3f& p : lens.positions) {
+    p = turn * p.cwiseProduct(Eigen::Vector3f(0.15F, 1.0F, 1.0F));
+  }
+  const auto result = RemeshTriangles(lens, {.target_quads = 1000}, RunContext{});
+  ASSERT_TRUE(result.ok()) << result.status();
+  EXPECT_EQ(result->report.num_flipped, 0u);
+  EXPECT_LT(result->report.worst_distance, 0.015);
+}
+
 TEST(RemeshTest, UnitsAndPlaceDoNotMatter) {
   TriangleMesh mesh = Halved(*BuiltinShape("torus"));
   const auto plain = RemeshTriangles(mesh, {.target_quads = 500}, RunContext{});

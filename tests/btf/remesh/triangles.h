@@ -10,12 +10,7 @@ namespace tessera {
 
 // Each quad as two triangles.
 inline TriangleMesh Halved(const QuadMesh& quads) {
-  TriangleMesh mesh{.positions = quads.positions};
-  for (const Quad& quad : quads.quads) {
-    mesh.triangles.push_back({quad[0], quad[1], quad[2]});
-    mesh.triangles.push_back({quad[0], quad[2], quad[3]});
-  }
-  return mesh;
+  return {.positions = quads.positions, .triangles = HalvesOf(quads.quads)};
 }
 
 // Twelve triangles, counter-clockwise seen from outside.
