@@ -16,6 +16,7 @@ namespace {
 
 constexpr Eigen::Index kTile = 256;
 constexpr int64_t kTexelsPerChunk = 2048;
+constexpr int64_t kMostKeptBytes = int64_t{512} << 20;  // of features, lest they be computed twice
 
 // ------------------------------------------------------------------------------------------------ covariance
 
@@ -24,6 +25,7 @@ struct Moments {
   Eigen::VectorXf shift;  // near the mean: what features are taken relative to, so that float sums suffice
   Eigen::VectorXd mean;
   Eigen::MatrixXd covariance;
+  std::vector<Eigen::MatrixXf> kept;  // features less shift, by chunk; none where they take too much
 };
 
 // Each tile is summed by one task, chunk after chunk, so that threads cannot change a bit.
@@ -39,6 +41,7 @@ absl::StatusOr<Moments> ComputeMoments(const TexelFeatures& features, int64_t nu
   Moments moments;
   Eigen::VectorXd sum = Eigen::VectorXd::Zero(size);
   Eigen::MatrixXf products = Eigen::MatrixXf::Zero(size, size);
+  const bool is_kept = num_texels * size * static_cast<int64_t>(sizeof(float)) <= kMostKeptBytes;
   Eigen::MatrixXf values;
   for (int64_t begin = 0; begin < num_texels; begin += kTexelsPerChunk) {
     context.Report("embed", begin, num_texels, "texels");
@@ -61,6 +64,9 @@ absl::StatusOr<Moments> ComputeMoments(const TexelFeatures& features, int64_t nu
       }
     });
     TESSERA_RETURN_IF_ERROR(context.CheckStop());
+    if (is_kept) {
+      moments.kept.push_back(std::move(values));
+    }
   }
   context.Report("embed", num_texels, num_texels, "texels");
   const Eigen::VectorXd offset = sum / static_cast<double>(num_texels);
@@ -256,10 +262,14 @@ absl::StatusOr<Embedding> EmbedFeatures(int width, int height, const TexelFeatur
   Eigen::MatrixXf values;
   for (int64_t begin = 0; begin < num_texels; begin += kTexelsPerChunk) {
     const int64_t end = std::min(num_texels, begin + kTexelsPerChunk);
-    values.resize(size, end - begin);
-    features.Compute(begin, end, values, context);
-    TESSERA_RETURN_IF_ERROR(context.CheckStop());
-    values.colwise() -= moments.shift;
+    if (moments.kept.empty()) {
+      values.resize(size, end - begin);
+      features.Compute(begin, end, values, context);
+      TESSERA_RETURN_IF_ERROR(context.CheckStop());
+      values.colwise() -= moments.shift;
+    } else {
+      values = std::move(moments.kept[begin / kTexelsPerChunk]);
+    }
     constexpr int64_t kTexelsPerTask = 256;
     ParallelFor(context, begin, end, kTexelsPerTask, [&](int64_t first, int64_t last) {
       Eigen::MatrixXf components_of = projection.transpose() * values.middleCols(first - begin, last - first);

@@ -62,9 +62,10 @@ class TexelFeatures {
 
 // As Codec::Embed for width x height texels (both >= 1); dims beyond F are not given, so result.dims =
 // min(dims, F). Deterministic for any number of threads; the sign of a component makes the largest of its
-// entries positive. Features are computed twice, 2,048 texels at a time. Memory besides the result: two F x F
-// matrices of doubles and 2,048 F floats. Cost: one F x F covariance over all texels in float, then subspace
-// iteration on it in double. Errors: INVALID_ARGUMENT (dims < 1), CANCELLED.
+// entries positive. Features are computed 2,048 texels at a time and kept; where they would take more than
+// 512 MiB they are computed twice. Memory besides the result: two F x F matrices of doubles and those. Cost:
+// one F x F covariance over all texels in float, then subspace iteration on it in double. Errors:
+// INVALID_ARGUMENT (dims < 1), CANCELLED.
 [[nodiscard]] absl::StatusOr<Embedding> EmbedFeatures(int width, int height, const TexelFeatures& features,
                                                       int dims, const RunContext& context);
 

@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <cstdlib>
+#include <limits>
 #include <tuple>
 
 #include "btf/base/parallel.h"
@@ -59,6 +60,32 @@ void AddCorrelation(const Eigen::MatrixXf& query, const Eigen::MatrixXf& exempla
       imaginary += q.head(size) * e.tail(size) - q.tail(size) * e.head(size);
     }
   }
+}
+
+// A value that at least `count` of `values` do not exceed, and not many more, but for the largest float.
+float BoundOfLeast(const std::vector<float>& values, size_t count, std::vector<float>& sample) {
+  constexpr size_t kStride = 13;
+  constexpr size_t kSpare = 8;
+  sample.clear();
+  for (size_t i = 0; i < values.size(); i += kStride) {
+    sample.push_back(values[i]);
+  }
+  for (size_t rank = count * 5 / 4 / kStride + kSpare; rank < sample.size(); rank *= 2) {
+    const auto bound = sample.begin() + static_cast<std::ptrdiff_t>(rank);
+    std::nth_element(sample.begin(), bound, sample.end());
+    if (std::isfinite(*bound) && static_cast<size_t>(std::ranges::count_if(
+                                     values, [&](float value) { return value <= *bound; })) >= count) {
+      return *bound;
+    }
+  }
+  return std::numeric_limits<float>::max();
+}
+
+// Above `value` by a rounding or two.
+float FloatAbove(double value) {
+  constexpr float kInfinity = std::numeric_limits<float>::infinity();
+  return std::min(std::nextafter(std::nextafter(static_cast<float>(value), kInfinity), kInfinity),
+                  std::numeric_limits<float>::max());
 }
 
 }  // namespace
@@ -232,7 +259,10 @@ std::vector<Candidate> CandidateSearch::Search(const SearchQuery& query, int reg
   }
   transform.Down(lines_, query_spectrum_);
 
-  offsets_.clear();
+  // Costs but for a constant and a factor: by turn, row and column. Infinite where no patch may lie.
+  std::vector<OffsetsOfTurn> of_turns;
+  size_t num_offsets = 0;
+  correlations_.clear();
   for (const int turn : turns) {
     const int num_u = spectra_->TurnedRegionWidth(turn) - query.width + 1;
     const int num_v = spectra_->TurnedRegionHeight(turn) - query.height + 1;
@@ -245,43 +275,65 @@ std::vector<Candidate> CandidateSearch::Search(const SearchQuery& query, int reg
     sum_.setZero(2 * transform.size(), transform.columns());
     AddCorrelation(query_spectrum_, spectra_->spectra_[turn][region], spectra_->channels_, sum_);
     transform.Back(sum_, num_u, num_v, columns_, correlation_);
+    const size_t first = correlations_.size();
+    correlations_.insert(correlations_.end(), correlation_.data(), correlation_.data() + correlation_.size());
     const auto [first_u, first_v] = spectra_->TurnedRegionOrigin(turn, region);
-    for (int v = 0; v < num_v; ++v) {
-      for (int u = 0; u < num_u; ++u) {
-        const Patch patch{turn, first_u + u, first_v + v};
-        if (!spectra_->MayBring(patch, query.width, query.height)) {
-          continue;
-        }
-        const double squares = std::max(0.0, wanted_square + double{correlation_(u, v)});
-        offsets_.push_back({patch, squares / norm});
+    const OffsetsOfTurn& added =
+        of_turns.emplace_back(OffsetsOfTurn{{turn, first_u, first_v}, num_u, first, correlations_.size()});
+    num_offsets += added.end - added.begin;
+    for (size_t i = added.begin; !spectra_->excluded_.empty() && i < added.end; ++i) {
+      if (!spectra_->MayBring(added.PatchAt(i), query.width, query.height)) {
+        correlations_[i] = std::numeric_limits<float>::infinity();
+        --num_offsets;
       }
     }
   }
 
-  // A generous prefix in order of cost, thinned so that no two are near each other.
+  // A generous prefix in order of cost, thinned so that no two are near each other. Few offsets are cheap
+  // enough to be looked at one by one.
   const size_t prefix =
-      std::min(offsets_.size(), static_cast<size_t>(count) * (2 * separation + 1) * (2 * separation + 1));
+      std::min(num_offsets, static_cast<size_t>(count) * (2 * separation + 1) * (2 * separation + 1));
+  if (prefix == 0) {
+    return {};
+  }
+  offsets_.clear();
+  const auto add_offsets = [&](float above, float most) {
+    for (const OffsetsOfTurn& of_turn : of_turns) {
+      for (size_t i = of_turn.begin; i < of_turn.end; ++i) {
+        if (correlations_[i] > above && correlations_[i] <= most) {
+          const double squares = std::max(0.0, wanted_square + double{correlations_[i]});
+          offsets_.push_back({of_turn.PatchAt(i), squares / norm});
+        }
+      }
+    }
+  };
+  // Beside the prefix all offsets that cost nothing, for those are as good as each other.
+  const float most =
+      std::max(BoundOfLeast(correlations_, prefix, sample_), static_cast<float>(-wanted_square));
+  add_offsets(-std::numeric_limits<float>::infinity(), most);
   const auto before = [](const Candidate& a, const Candidate& b) {
     return a.cost != b.cost ? a.cost < b.cost
                             : std::tuple(a.patch.turn, a.patch.v, a.patch.u) <
                                   std::tuple(b.patch.turn, b.patch.v, b.patch.u);
   };
-  const auto add_repetition = [&](Candidate& offset) {
-    offset.cost *= 1.0 + repetition * usage->RelativeUse(offset.patch, query.width, query.height);
-  };
   size_t num_ordered = offsets_.size();
-  if (usage != nullptr && prefix < offsets_.size()) {
+  if (usage != nullptr) {
+    const auto add_repetition = [&](size_t begin, size_t end) {
+      for (size_t i = begin; i < end; ++i) {
+        offsets_[i].cost *=
+            1.0 + repetition * usage->RelativeUse(offsets_[i].patch, query.width, query.height);
+      }
+    };
+    const auto at = [&](size_t index) { return offsets_.begin() + static_cast<std::ptrdiff_t>(index); };
     // Repetition only adds: no offset is among the best that costs more without it than so many do with it.
-    const auto end = offsets_.begin() + static_cast<std::ptrdiff_t>(prefix);
-    std::nth_element(offsets_.begin(), end, offsets_.end(), before);
-    std::for_each(offsets_.begin(), end, add_repetition);
-    const double bound = std::max_element(offsets_.begin(), end, before)->cost;
-    const auto dear =
-        std::partition(end, offsets_.end(), [&](const Candidate& offset) { return offset.cost <= bound; });
-    std::for_each(end, dear, add_repetition);
-    num_ordered = static_cast<size_t>(dear - offsets_.begin());
-  } else if (usage != nullptr) {
-    std::for_each(offsets_.begin(), offsets_.end(), add_repetition);
+    std::nth_element(at(0), at(prefix), offsets_.end(), before);
+    add_repetition(0, prefix);
+    const double bound = std::max_element(at(0), at(prefix), before)->cost;
+    add_offsets(most, FloatAbove(bound * norm - wanted_square));
+    const auto dear = std::partition(at(prefix), offsets_.end(),
+                                     [&](const Candidate& offset) { return offset.cost <= bound; });
+    num_ordered = static_cast<size_t>(dear - at(0));
+    add_repetition(prefix, num_ordered);
   }
   const auto ordered_end = offsets_.begin() + static_cast<std::ptrdiff_t>(num_ordered);
   const auto prefix_end = offsets_.begin() + static_cast<std::ptrdiff_t>(prefix);

@@ -126,8 +126,21 @@ class CandidateSearch {
                                 const std::stop_token& stop);
 
  private:
+  // A stretch of correlations_: rows of num_u offsets, the first at `first`.
+  struct OffsetsOfTurn {
+    Patch first;
+    int num_u = 0;
+    size_t begin = 0;
+    size_t end = 0;
+    [[nodiscard]] Patch PatchAt(size_t index) const {
+      const auto i = static_cast<int>(index - begin);
+      return {first.turn, first.u + i % num_u, first.v + i / num_u};
+    }
+  };
+
   const ExemplarSpectra* spectra_;
   Eigen::MatrixXf channel_, lines_, query_spectrum_, sum_, columns_, correlation_;
+  std::vector<float> correlations_, sample_;
   std::vector<Candidate> offsets_;
 };
 

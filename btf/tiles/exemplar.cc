@@ -5,7 +5,6 @@
 namespace tessera {
 namespace {
 
-constexpr int kLane = 8;                // floats of an AVX register
 constexpr double kSmallestStep = 1e-6;  // of a constant exemplar: keeps ratios finite
 
 int RoundUp(int n, int multiple) {
@@ -58,6 +57,7 @@ Exemplar::Exemplar(const Embedding& embedding, SeamRule seam_rule, int cut_dims)
     }
   }
   mean_step_ = std::max(kSmallestStep, sum / static_cast<double>(std::max<int64_t>(1, num_steps)));
+  mean_steps_per_unit_ = 1.0 / mean_step_;
 
   double spread_square = 0.0;
   for (int dim = 0; dim < dims_; ++dim) {
@@ -128,20 +128,6 @@ uint32_t Exemplar::Shift(uint32_t texel, int dx, int dy) const {
     return kNoTexel;
   }
   return PackTexel(static_cast<uint32_t>(y * width_ + x), TurnsOfTexel(texel));
-}
-
-float Exemplar::Distance(uint32_t a, uint32_t b) const {
-  const float* const p = Point(a);
-  const float* const q = Point(b);
-  float lanes[kLane] = {};
-  for (int i = 0; i < dims_; i += kLane) {
-    for (int j = 0; j < kLane; ++j) {
-      const float difference = p[i + j] - q[i + j];
-      lanes[j] += difference * difference;
-    }
-  }
-  return std::sqrt(((lanes[0] + lanes[4]) + (lanes[1] + lanes[5])) +
-                   ((lanes[2] + lanes[6]) + (lanes[3] + lanes[7])));
 }
 
 }  // namespace tessera

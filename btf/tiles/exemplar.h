@@ -73,7 +73,19 @@ class Exemplar {
     return values_.data() +
            (static_cast<size_t>(TurnsOfTexel(texel)) * num_pixels() + BtfelOfTexel(texel)) * dims_;
   }
-  [[nodiscard]] float Distance(uint32_t a, uint32_t b) const;
+  [[nodiscard]] float Distance(uint32_t a, uint32_t b) const {
+    const float* const p = Point(a);
+    const float* const q = Point(b);
+    float lanes[kLane] = {};
+    for (int i = 0; i < dims_; i += kLane) {
+      for (int j = 0; j < kLane; ++j) {
+        const float difference = p[i + j] - q[i + j];
+        lanes[j] += difference * difference;
+      }
+    }
+    return std::sqrt(((lanes[0] + lanes[4]) + (lanes[1] + lanes[5])) +
+                     ((lanes[2] + lanes[6]) + (lanes[3] + lanes[7])));
+  }
   // Of a texel and the one beside it in a GridCut::Direction, from a table; 0 off the exemplar.
   [[nodiscard]] float StepLength(uint32_t texel, int direction) const {
     return step_lengths_[(static_cast<size_t>(TurnsOfTexel(texel)) * 4 + direction) * num_pixels() +
@@ -83,6 +95,7 @@ class Exemplar {
   // What mismatches are measured in: the mean distance of neighbours, and the root mean square distance of
   // two texels drawn at random.
   [[nodiscard]] double mean_step() const { return mean_step_; }
+  [[nodiscard]] double mean_steps_per_unit() const { return mean_steps_per_unit_; }
   [[nodiscard]] double spread() const { return spread_; }
   // Over all texels in all turns, [dims].
   [[nodiscard]] const std::vector<double>& mean() const { return mean_; }
@@ -90,12 +103,15 @@ class Exemplar {
   [[nodiscard]] double search_spread() const { return search_spread_; }
 
  private:
+  static constexpr int kLane = 8;  // floats of an AVX register
+
   SeamRule seam_rule_;
   int width_ = 0;
   int height_ = 0;
   int dims_ = 0;
   int search_dims_ = 0;
   double mean_step_ = 0.0;
+  double mean_steps_per_unit_ = 0.0;
   double spread_ = 0.0;
   double search_spread_ = 0.0;
   std::vector<double> mean_;

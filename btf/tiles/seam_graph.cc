@@ -18,8 +18,8 @@ int SeamCost(const Exemplar& exemplar, uint32_t a, uint32_t b, float mismatch, f
     const float expected_excess = std::sqrt(step * step + mismatch * mismatch) - step;
     visible = std::max(0.0f, 2.0f * exemplar.Distance(a, b) - step) + kContinuity * expected_excess;
   }
-  const double cost = std::lround(visible * (kCostPerStep / exemplar.mean_step()));
-  return static_cast<int>(std::min<double>(cost, kMaxPairCost));
+  const double cost = visible * (kCostPerStep * exemplar.mean_steps_per_unit());
+  return static_cast<int>(std::min(cost + 0.5, double{kMaxPairCost}));
 }
 
 float Mismatch(const Exemplar& exemplar, uint32_t a, uint32_t b) {
@@ -137,11 +137,15 @@ const PatchCut& PatchCutter::Cut(const Canvas& canvas, const Window& window, con
   new_texels_.resize(cut_.takes_new.size());
   distance_.assign(cut_.takes_new.size(), 0.0f);
   grid_.Reset(width, height);
+  // Texels of a patch lie at even distances.
+  const uint32_t first = exemplar.TexelAt(patch.turn, patch.u, patch.v);
+  const uint32_t right = exemplar.TexelAt(patch.turn, patch.u + 1, patch.v) - first;
+  const uint32_t down = exemplar.TexelAt(patch.turn, patch.u, patch.v + 1) - first;
   for (int y = 0; y < height; ++y) {
     for (int x = 0; x < width; ++x) {
       const size_t index = static_cast<size_t>(y) * width + x;
       const uint32_t old_texel = canvas.texel(window.x + x, window.y + y);
-      new_texels_[index] = exemplar.TexelAt(patch.turn, patch.u + x, patch.v + y);
+      new_texels_[index] = first + x * right + y * down;
       if (old_texel == kNoTexel) {
         grid_.AddTerminals(x, y, GridCut::kPinned, 0);
       } else {

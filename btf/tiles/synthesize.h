@@ -50,8 +50,8 @@ struct SynthesisParams {
   bool force = false;
   SynthesisMethod method = SynthesisMethod::kFrame;
   SeamRule seam_rule = SeamRule::kExcess;
-  // Patches cut for each window that is improved; half of it, rounded up, for each that is filled. At
-  // least 1.
+  // Patches cut for each window of a strip that is improved; 5/8 of it, rounded up, for each of a tile, and
+  // half of it for each that is filled. At least 1.
   int num_candidates = 16;
   // How many times as many windows are tried while seams show more than the material's own steps do, and how
   // many times nearer to those they must come to be good. In [1, kMostEffort].

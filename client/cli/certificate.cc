@@ -83,7 +83,7 @@ std::vector<std::string> CertificateWarnings(const Json& certificate) {
   if (const auto ratio = Number(certificate, "/repetition/ratio"); ratio && *ratio > kRepetitionLimit) {
     warnings.push_back(fmt::format(
         "a plane of tiles repeats {:.2f} times as much as the material, above the limit of {:.2f}: "
-        "larger tiles repeat less, and so does surface-26",
+        "larger tiles repeat less, and so do turned ones (surface-26)",
         *ratio, kRepetitionLimit));
   }
   return warnings;
