@@ -219,12 +219,63 @@ CandidateSearch::CandidateSearch(const ExemplarSpectra& spectra) : spectra_(&spe
 
 CandidateSearch::~CandidateSearch() = default;
 
+size_t CandidateSearch::Correlate(const SearchQuery& query, int region, const std::vector<int>& turns,
+                                  const std::stop_token& stop) {
+  const FourierTransform& transform = *spectra_->transform_;
+  const int dims = spectra_->exemplar().search_dims();
+  channel_.resize(query.height, query.width);
+  lines_.resize(2 * query.height, spectra_->channels_ * transform.columns());
+  for (int channel = 0; channel < spectra_->channels_; ++channel) {
+    if (stop.stop_requested()) {
+      return 0;
+    }
+    for (int x = 0; x < query.width; ++x) {
+      for (int y = 0; y < query.height; ++y) {
+        const size_t i = static_cast<size_t>(y) * query.width + x;
+        channel_(y, x) =
+            channel < dims ? -2.0f * query.weights[i] * query.wanted[i * dims + channel] : query.weights[i];
+      }
+    }
+    transform.Across(channel_, channel, lines_);
+  }
+  transform.Down(lines_, query_spectrum_);
+
+  size_t num_offsets = 0;
+  of_turns_.clear();
+  correlations_.clear();
+  for (const int turn : turns) {
+    const int num_u = spectra_->TurnedRegionWidth(turn) - query.width + 1;
+    const int num_v = spectra_->TurnedRegionHeight(turn) - query.height + 1;
+    if (num_u <= 0 || num_v <= 0) {
+      continue;
+    }
+    if (stop.stop_requested()) {
+      return 0;
+    }
+    sum_.setZero(2 * transform.size(), transform.columns());
+    AddCorrelation(query_spectrum_, spectra_->spectra_[turn][region], spectra_->channels_, sum_);
+    transform.Back(sum_, num_u, num_v, columns_, correlation_);
+    const size_t begin = correlations_.size();
+    correlations_.insert(correlations_.end(), correlation_.data(), correlation_.data() + correlation_.size());
+    const auto [first_u, first_v] = spectra_->TurnedRegionOrigin(turn, region);
+    const OffsetsOfTurn& added =
+        of_turns_.emplace_back(OffsetsOfTurn{{turn, first_u, first_v}, num_u, begin, correlations_.size()});
+    num_offsets += added.end - added.begin;
+    for (size_t i = added.begin; !spectra_->excluded_.empty() && i < added.end; ++i) {
+      if (!spectra_->MayBring(added.PatchAt(i), query.width, query.height)) {
+        correlations_[i] = std::numeric_limits<float>::infinity();
+        --num_offsets;
+      }
+    }
+  }
+  return num_offsets;
+}
+
 std::vector<Candidate> CandidateSearch::Search(const SearchQuery& query, int region,
                                                const std::vector<int>& turns, const UsageMap* usage,
                                                double repetition, int count, int separation,
                                                const std::stop_token& stop) {
   const Exemplar& exemplar = spectra_->exemplar();
-  const FourierTransform& transform = *spectra_->transform_;
   const int dims = exemplar.search_dims();
   const int num_texels = query.width * query.height;
 
@@ -239,55 +290,8 @@ std::vector<Candidate> CandidateSearch::Search(const SearchQuery& query, int reg
     }
     wanted_square += query.weights[i] * square;
   }
-
   const double norm = exemplar.search_spread() * (weight_sum > 0.0 ? weight_sum : 1.0);
-
-  channel_.resize(query.height, query.width);
-  lines_.resize(2 * query.height, spectra_->channels_ * transform.columns());
-  for (int channel = 0; channel < spectra_->channels_; ++channel) {
-    if (stop.stop_requested()) {
-      return {};
-    }
-    for (int x = 0; x < query.width; ++x) {
-      for (int y = 0; y < query.height; ++y) {
-        const size_t i = static_cast<size_t>(y) * query.width + x;
-        channel_(y, x) =
-            channel < dims ? -2.0f * query.weights[i] * query.wanted[i * dims + channel] : query.weights[i];
-      }
-    }
-    transform.Across(channel_, channel, lines_);
-  }
-  transform.Down(lines_, query_spectrum_);
-
-  // Costs but for a constant and a factor: by turn, row and column. Infinite where no patch may lie.
-  std::vector<OffsetsOfTurn> of_turns;
-  size_t num_offsets = 0;
-  correlations_.clear();
-  for (const int turn : turns) {
-    const int num_u = spectra_->TurnedRegionWidth(turn) - query.width + 1;
-    const int num_v = spectra_->TurnedRegionHeight(turn) - query.height + 1;
-    if (num_u <= 0 || num_v <= 0) {
-      continue;
-    }
-    if (stop.stop_requested()) {
-      return {};
-    }
-    sum_.setZero(2 * transform.size(), transform.columns());
-    AddCorrelation(query_spectrum_, spectra_->spectra_[turn][region], spectra_->channels_, sum_);
-    transform.Back(sum_, num_u, num_v, columns_, correlation_);
-    const size_t first = correlations_.size();
-    correlations_.insert(correlations_.end(), correlation_.data(), correlation_.data() + correlation_.size());
-    const auto [first_u, first_v] = spectra_->TurnedRegionOrigin(turn, region);
-    const OffsetsOfTurn& added =
-        of_turns.emplace_back(OffsetsOfTurn{{turn, first_u, first_v}, num_u, first, correlations_.size()});
-    num_offsets += added.end - added.begin;
-    for (size_t i = added.begin; !spectra_->excluded_.empty() && i < added.end; ++i) {
-      if (!spectra_->MayBring(added.PatchAt(i), query.width, query.height)) {
-        correlations_[i] = std::numeric_limits<float>::infinity();
-        --num_offsets;
-      }
-    }
-  }
+  const size_t num_offsets = Correlate(query, region, turns, stop);
 
   // A generous prefix in order of cost, thinned so that no two are near each other. Few offsets are cheap
   // enough to be looked at one by one.
@@ -298,7 +302,7 @@ std::vector<Candidate> CandidateSearch::Search(const SearchQuery& query, int reg
   }
   offsets_.clear();
   const auto add_offsets = [&](float above, float most) {
-    for (const OffsetsOfTurn& of_turn : of_turns) {
+    for (const OffsetsOfTurn& of_turn : of_turns_) {
       for (size_t i = of_turn.begin; i < of_turn.end; ++i) {
         if (correlations_[i] > above && correlations_[i] <= most) {
           const double squares = std::max(0.0, wanted_square + double{correlations_[i]});

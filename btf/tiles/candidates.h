@@ -126,7 +126,7 @@ class CandidateSearch {
                                 const std::stop_token& stop);
 
  private:
-  // A stretch of correlations_: rows of num_u offsets, the first at `first`.
+  // A stretch of correlations_: rows of num_u offsets, the first of them `first`.
   struct OffsetsOfTurn {
     Patch first;
     int num_u = 0;
@@ -138,9 +138,16 @@ class CandidateSearch {
     }
   };
 
+  // Fills correlations_ and of_turns_. Returns how many offsets may be taken, 0 after a stop request.
+  size_t Correlate(const SearchQuery& query, int region, const std::vector<int>& turns,
+                   const std::stop_token& stop);
+
   const ExemplarSpectra* spectra_;
   Eigen::MatrixXf channel_, lines_, query_spectrum_, sum_, columns_, correlation_;
-  std::vector<float> correlations_, sample_;
+  // Costs of all offsets but for a constant and a factor; infinite where no patch may lie.
+  std::vector<float> correlations_;
+  std::vector<OffsetsOfTurn> of_turns_;
+  std::vector<float> sample_;
   std::vector<Candidate> offsets_;
 };
 

@@ -19,7 +19,7 @@ int SeamCost(const Exemplar& exemplar, uint32_t a, uint32_t b, float mismatch, f
     visible = std::max(0.0f, 2.0f * exemplar.Distance(a, b) - step) + kContinuity * expected_excess;
   }
   const double cost = visible * (kCostPerStep * exemplar.mean_steps_per_unit());
-  return static_cast<int>(std::min(cost + 0.5, double{kMaxPairCost}));
+  return static_cast<int>(std::min(cost + 0.5, double{kMaxPairCost}));  // rounded
 }
 
 float Mismatch(const Exemplar& exemplar, uint32_t a, uint32_t b) {
