@@ -18,8 +18,8 @@ namespace tessera {
 }
 
 // [faces], 0..3. In every connected component that has a consistent frame it is found, with 0 turns on the
-// lowest face. Elsewhere the frame is spread breadth first from there, then single quads are turned while
-// that lowers the number of edges at which it breaks: a local minimum, not always the least possible.
+// lowest face. Elsewhere the frame is spread breadth first from there, then simulated annealing lowers the
+// number of edges at which it breaks: near the least possible, not always there. A million draws at most.
 [[nodiscard]] std::vector<uint8_t> ConsistentTurns(const QuadAdjacency& adjacency);
 
 }  // namespace tessera

@@ -276,6 +276,33 @@ TEST(FrameFieldTest, ContinuesAFrameAcrossEveryPairOfSides) {
   }
 }
 
+size_t NumBreaks(const QuadMesh& mesh) {
+  const QuadAdjacency adjacency = *BuildAdjacency(mesh);
+  const std::vector<uint8_t> turns = ConsistentTurns(adjacency);
+  size_t sides = 0;
+  for (size_t face = 0; face < turns.size(); ++face) {
+    for (int k = 0; k < 4; ++k) {
+      const auto& across = adjacency.across[face][k];
+      sides += turns[across.face] != ContinuedTurns(turns[face], k, across.side);
+    }
+  }
+  return sides / 2;
+}
+
+TEST(FrameFieldTest, BreaksAsLittleAsACubeDoes) {
+  // The eight corners of the cube turn the frame by a quarter each, so that trees of breaks join four of them
+  // at least: three edges of the cube for each tree.
+  const auto cube = BuiltinShape("cube-sphere");
+  const auto side =
+      static_cast<size_t>(std::lround(std::sqrt(static_cast<double>(cube->quads.size()) / 6.0)));
+  EXPECT_EQ(NumBreaks(*cube), 2 * 3 * side);
+}
+
+TEST(FrameFieldTest, FindsWhatSingleQuadsDoNot) {
+  // Spread from the first quad, with single quads turned while that helps, it has 34.
+  EXPECT_LE(NumBreaks(*BuiltinShape("genus3")), 20U);
+}
+
 TEST(TileNeighbourTest, TurnsAreThoseSeenInTheFirstTilesFrame) {
   // Two quads side by side, the right one starting at another corner and laid with other turns. Points of the
   // right tile are laid out in the plane and compared.
