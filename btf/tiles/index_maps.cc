@@ -23,7 +23,7 @@ constexpr int kLargestTile = 16384;
 constexpr int kTilesAtOnce = 4;  // laid without knowing each other
 
 // Strips are few and every tile shows them; as many patches for each window of a tile take half as long again
-// and show no less seams.
+// and lower R by a twentieth at most.
 constexpr int ImprovedCandidates(int num_candidates) {
   return (5 * num_candidates + 7) / 8;
 }
