@@ -12,7 +12,7 @@ namespace tessera {
 namespace {
 
 constexpr int kMostSweeps = 200;
-constexpr size_t kMostDraws = 1000000;  // in all sweeps
+constexpr size_t kMostDraws = 1000000;  // in all sweeps of all components
 // In broken edges: at the first a domain wall moves freely and does not melt, at the last none is left.
 constexpr double kFirstTemperature = 0.8;
 constexpr double kLastTemperature = 0.15;
@@ -59,7 +59,8 @@ void Settle(const QuadAdjacency& adjacency, std::span<const uint32_t> faces, std
 // Simulated annealing: faces are drawn turned the more likely the more of their neighbours agree, ever more
 // so.
 void Anneal(const QuadAdjacency& adjacency, std::span<const uint32_t> faces, std::vector<uint8_t>& turns) {
-  const int num_sweeps = static_cast<int>(std::min<size_t>(kMostSweeps, kMostDraws / faces.size()));
+  const size_t num_faces = adjacency.across.size();
+  const int num_sweeps = static_cast<int>(std::min<size_t>(kMostSweeps, kMostDraws / num_faces));
   Rng rng(faces.front());
   for (int sweep = 0; sweep < num_sweeps; ++sweep) {
     const double temperature = kFirstTemperature * std::pow(kLastTemperature / kFirstTemperature,
@@ -88,11 +89,17 @@ void Anneal(const QuadAdjacency& adjacency, std::span<const uint32_t> faces, std
 void LowerBreaks(const QuadAdjacency& adjacency, std::span<const uint32_t> faces,
                  std::vector<uint8_t>& turns) {
   Settle(adjacency, faces, turns);
-  const std::vector<uint8_t> settled = turns;
+  const int64_t settled_continued = CountContinued(adjacency, faces, turns);
+  std::vector<uint8_t> settled;
+  for (const uint32_t face : faces) {
+    settled.push_back(turns[face]);
+  }
   Anneal(adjacency, faces, turns);
   Settle(adjacency, faces, turns);
-  if (CountContinued(adjacency, faces, turns) <= CountContinued(adjacency, faces, settled)) {
-    turns = settled;
+  if (CountContinued(adjacency, faces, turns) <= settled_continued) {
+    for (size_t i = 0; i < faces.size(); ++i) {
+      turns[faces[i]] = settled[i];
+    }
   }
 }
 
