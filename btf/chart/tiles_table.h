@@ -32,9 +32,8 @@ struct TilesRow {
 };
 
 // Synthesises "surface-96" by the default parameters, thresholds not enforced, from generated materials of
-// the paper's sizes, encoded by "dsh" with as many coefficients; about ten minutes on two cores, most of them
-// to encode 800 x 800 texels. Progress in "tile sets". Errors: those of GenerateBtf, of Encode and of
-// synthesis; CANCELLED.
+// the paper's sizes, encoded by "dsh" with as many coefficients; minutes. Progress in "tile sets". Errors:
+// those of GenerateBtf, of Encode and of synthesis; CANCELLED.
 [[nodiscard]] absl::StatusOr<std::vector<TilesRow>> RunTilesTable(const RunContext& context);
 
 // One row each row of the table and method, the paper's figures as method "paper".

@@ -22,8 +22,7 @@ constexpr int kSmallestExemplar = 32;
 constexpr int kLargestTile = 16384;
 constexpr int kTilesAtOnce = 4;  // laid without knowing each other
 
-// Strips are few and every tile shows them; as many patches for each window of a tile take half as long again
-// and lower R by a twentieth at most.
+// Of a window of a tile. Strips are few and every tile shows them, so that they are worth more.
 constexpr int ImprovedCandidates(int num_candidates) {
   return (5 * num_candidates + 7) / 8;
 }

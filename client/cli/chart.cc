@@ -433,7 +433,7 @@ void AddChartCommand(CLI::App& app, Session& session) {
       AddChart(*synthesis, "Folder for synthesis.html, synthesis.csv, tiles.csv and pictures of the tiles",
                "Few settings, on the middle 64x64 texels: under a minute");
   synthesis->add_flag("--paper", synthesis_flags->paper,
-                      "Table III of Leung et al. 2007, ours beside it: about ten minutes more");
+                      "Table III of Leung et al. 2007, ours beside it: many minutes more");
   synthesis->callback([&session, synthesis_flags] {
     session.run = [&session, synthesis_flags] { return RunSynthesis(session, *synthesis_flags); };
   });

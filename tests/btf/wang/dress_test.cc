@@ -299,7 +299,7 @@ TEST(FrameFieldTest, BreaksAsLittleAsACubeDoes) {
 }
 
 TEST(FrameFieldTest, FindsWhatSingleQuadsDoNot) {
-  // Spread from the first quad, with single quads turned while that helps, it has 34.
+  // More break where the frame is spread from the first quad and single quads are turned while that helps.
   EXPECT_LE(NumBreaks(*BuiltinShape("genus3")), 20U);
 }
 
