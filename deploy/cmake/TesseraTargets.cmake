@@ -16,7 +16,7 @@ function(tessera_compile_options target)
     target_compile_options(${target} PRIVATE -march=x86-64-v3)
   endif()
   # Eigen sums matrix products in blocks that fit the caches it finds, which rounds in another way on another machine and
-  # from there on draws other patches. These sizes in their place cost no time where caches are smaller.
+  # from there on draws other patches. One size for all machines.
   target_compile_definitions(${target} PRIVATE EIGEN_NO_CPUID EIGEN_DEFAULT_L1_CACHE_SIZE=49152
                              EIGEN_DEFAULT_L2_CACHE_SIZE=524288 EIGEN_DEFAULT_L3_CACHE_SIZE=33554432)
   if(CMAKE_BUILD_TYPE STREQUAL "Release")
